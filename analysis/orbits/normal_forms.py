@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import OrbitError
@@ -28,7 +29,7 @@ class Nordmark:
     restitution : float
         r.
     sign : float
-        Of the sine of the damped phase that a period covers: +1 or -1.
+        Of the displacement that a push at the graze is one period later: +1 or -1.
     """
 
     alpha: float
@@ -37,9 +38,20 @@ class Nordmark:
     sign: float = 1.0
 
     @property
-    def of_an_oscillator(self) -> bool:
-        """Whether an underdamped oscillator has such numbers: alpha is 2 sqrt(gamma) times a cosine."""
-        return 0.0 < self.gamma < 1.0 and abs(self.alpha) <= 2.0 * math.sqrt(self.gamma)
+    def oscillator(self) -> tuple[float, float] | None:
+        """Damping ratio, and angular frequency of the force over the natural one, of the fastest oscillator so forced.
+
+        None where no oscillator has this trace and determinant: an underdamped one has alpha = 2 sqrt(gamma) cos, an
+        overdamped one two positive eigenvalues below 1, so that -2 sqrt(gamma) <= alpha < 1 + gamma.
+        """
+        if not (0.0 < self.gamma < 1.0 and -2.0 * math.sqrt(self.gamma) <= self.alpha < 1.0 + self.gamma):
+            return None
+        decay = -0.5 * math.log(self.gamma)  # times the period
+        half = 0.5 * self.alpha / math.sqrt(self.gamma)
+        # what the damped motion turns in a period; squared it is below 0 of an overdamped one
+        turned = math.acos(half) ** 2 if half <= 1.0 else -(math.acosh(half) ** 2)
+        natural = math.sqrt(turned + decay**2)
+        return decay / natural, 2.0 * math.pi / natural
 
     def step(self, x: Floats, y: Floats, rho: Floats) -> tuple[Floats, Floats]:
         """Return the next states."""
@@ -51,8 +63,12 @@ class Nordmark:
         )
 
     def diagram(self, rho: Floats, kept: int = KEPT, transient: int = TRANSIENT) -> Floats:
-        """Return X after a transient at each rho, shape (rho, kept); NaN where it grows without bound."""
-        x, y = np.zeros_like(rho), np.zeros_like(rho)
+        """Return X after a transient at each rho, shape (rho, kept); NaN where it grows without bound.
+
+        It begins with the motion without impacts, and beyond the graze at the graze.
+        """
+        x = np.where(rho < 0.0, rho / (1.0 - self.alpha + self.gamma), 0.0)
+        y = -self.gamma * x
         found = np.empty((rho.size, kept))
         with np.errstate(over="ignore", invalid="ignore"):
             for number in range(transient + kept):
@@ -102,30 +118,24 @@ def grazing_family(body: ImpactingBody, amplitude: float) -> GrazingFamily:
     Raises
     ------
     OrbitError
-        It has several modes or stops, is not underdamped, rests on its stop, or its map is void.
+        It has several modes or stops, rests on its stop, or its map is void.
     """
     natural, decay, toward = one_mode(body)
     contact, w = body.contacts[0], body.angular_frequency
     gap = contact.direction * contact.position - toward * float(body.held[0]) / natural**2
     if not gap > 0.0:
         raise OrbitError("maps: expected a stop that the body at rest does not touch, got one that it does.")
-    if not decay < natural:
-        raise OrbitError("maps: expected an underdamped body, got an overdamped one.")
-    damped = math.sqrt(natural**2 - decay**2)
-    turn = 2.0 * math.pi * damped / w
-    gamma = math.exp(-4.0 * math.pi * decay / w)
-    alpha, sine = 2.0 * math.sqrt(gamma) * math.cos(turn), math.sin(turn)
-    if abs(sine) < 1e-9:
+    flow = expm(body.period * np.array([[0.0, 1.0], [-(natural**2), -2.0 * decay]]))
+    alpha, gamma, push = float(np.trace(flow)), math.exp(-2.0 * decay * body.period), float(flow[0, 1])
+    if abs(push) * natural < 1e-9 * math.sqrt(gamma):
         raise OrbitError(
             f"maps: expected an angular frequency at which the root term is there, got {w:g}: the damped motion makes "
             "whole half turns in a period (codimension 2)."
         )
     size = math.hypot(natural**2 - w**2, 2.0 * decay * w)
     graze = gap * size / abs(toward * float(body.force[0]) / amplitude)
-    slope = (1.0 - alpha + gamma) / (
-        2.0 * gamma * (w / damped) ** 2 * (1.0 + contact.restitution) ** 2 * sine**2
-    )
-    return GrazingFamily(Nordmark(alpha, gamma, contact.restitution, math.copysign(1.0, sine)), graze, slope)
+    slope = (1.0 - alpha + gamma) / (2.0 * (w * (1.0 + contact.restitution) * push) ** 2)
+    return GrazingFamily(Nordmark(alpha, gamma, contact.restitution, math.copysign(1.0, push)), graze, slope)
 
 
 def one_mode(body: ImpactingBody) -> tuple[float, float, float]:

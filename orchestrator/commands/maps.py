@@ -61,12 +61,15 @@ def _tell_diagram(found: xr.Dataset, name: str) -> None:
         say(", ".join(f"{key} {value:.8g}" for key, value in numbers.items()) + ".")
         if "grazing_amplitude" in found.attrs:
             say(f"Graze at the forcing amplitude {float(found.attrs['grazing_amplitude']):.12g}.")
-        if not found.attrs["of_an_oscillator"]:
-            most = 2.0 * np.sqrt(max(numbers["gamma"], 0.0))
-            say(
-                f"No oscillator has these numbers: alpha = 2 sqrt(gamma) cos(2 pi w_d / w), at most {most:.4g} in size "
-                "(equations 4.9)."
+        elif "oscillator_damping_ratio" in found.attrs:
+            ratio, frequency = (
+                float(found.attrs[f"oscillator_{key}_ratio"]) for key in ("damping", "frequency")
             )
+            say(
+                f"An oscillator of damping ratio {ratio:.8g} has these, forced at {frequency:.8g} times its frequency."
+            )
+        else:
+            say("No oscillator has these: expected -2 sqrt(gamma) <= alpha < 1 + gamma.")
     states = found["x"].values
     bounded = np.isfinite(states).all(axis=1)
     periods = periods_of(np.nan_to_num(states))

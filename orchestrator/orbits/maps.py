@@ -304,16 +304,13 @@ def _nordmark(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
             "1" if plain else "N",
             "forcing amplitude",
         )
-    of = {
-        "alpha": chosen.alpha,
-        "gamma": chosen.gamma,
-        "restitution": chosen.restitution,
-        "root_sign": chosen.sign,
-    }
-    graze = {} if family is None else {"grazing_amplitude": family.amplitude, "rho_slope": family.slope}
-    return xr.Dataset(described(rows)).assign_attrs(
-        of | graze | {"of_an_oscillator": int(chosen.of_an_oscillator)}
-    )
+    attributes = {"alpha": chosen.alpha, "gamma": chosen.gamma, "restitution": chosen.restitution}
+    if family is not None:
+        attributes |= {"grazing_amplitude": family.amplitude, "rho_slope": family.slope}
+    if chosen.oscillator is not None:
+        ratio, frequency = chosen.oscillator
+        attributes |= {"oscillator_damping_ratio": ratio, "oscillator_frequency_ratio": frequency}
+    return xr.Dataset(described(rows)).assign_attrs(attributes | {"root_sign": chosen.sign})
 
 
 def _square_root(settings: MapSettings) -> xr.Dataset:

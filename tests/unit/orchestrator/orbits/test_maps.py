@@ -72,7 +72,22 @@ def test_nordmarks_map_of_a_scene_begins_at_its_graze() -> None:
     ]
     assert hits[0] == 0 < hits[1]
     assert np.interp(0.0, found.rho, found.forcing_amplitude) == pytest.approx(graze)
-    assert found.attrs["of_an_oscillator"] == 1
+    assert found.attrs["oscillator_damping_ratio"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("rho", "name"), [(5e-5, "P(1,9)"), (2e-4, "P(1,8)"), (5e-4, "P(1,7)"), (2e-3, "P(1,6)")]
+)
+def test_an_overdamped_oscillator_moves_as_its_nordmark_map_near_the_graze(rho: float, name: str) -> None:
+    # thesis figure 2.18: alpha is beyond what an underdamped oscillator has
+    of = scene(EXAMPLES / "thesis" / "figure_2_18.toml")
+    found = vi.maps(of, "nordmark", span=(rho * 0.999, rho * 1.001), points=10)
+    assert (found.attrs["alpha"], found.attrs["gamma"]) == pytest.approx((0.65, 0.05), rel=1e-12)
+    states = found.x.values[5]
+    period = int(name[4:-1])
+    assert np.allclose(states[period:], states[:-period], rtol=1e-6, atol=0.0)
+    amplitude = found.attrs["grazing_amplitude"] * (1.0 + rho / found.attrs["rho_slope"])
+    assert vi.classify(vi.run(of.with_values({"forcing.amplitude": amplitude})))[0].name == name
 
 
 @pytest.mark.parametrize("kind", ["impact", "strobe"])
@@ -94,7 +109,7 @@ def test_bodies_of_several_modes_have_these_maps_too(kind: str) -> None:
         (["--kind", "square-root", "--slope", "0.25"], "period 3 from"),
         (
             ["--kind", "nordmark", "--alpha", "0.65", "--gamma", "0.05"],
-            "No oscillator has these numbers: alpha = 2 sqrt(gamma) cos(2 pi w_d / w), at most 0.4472 in size",
+            "An oscillator of damping ratio 1.2668305 has these, forced at 5.3140467 times its frequency.",
         ),
         ([str(ONE), "--kind", "nordmark"], "Graze at the forcing amplitude 0.30614924"),
     ],
