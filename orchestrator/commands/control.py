@@ -15,15 +15,9 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.commands.energies import write_found
 from vibroimpact.orchestrator.commands.failures import counted
-from vibroimpact.orchestrator.orbits.control import (
-    HISTORY,
-    Controlled,
-    ControlPlan,
-    ControlSettings,
-    control_plan,
-    coupled_scene,
-    run_plan,
-)
+from vibroimpact.orchestrator.orbits.control import HISTORY, Controlled, run_plan
+from vibroimpact.orchestrator.orbits.control_parts import coupled_scene
+from vibroimpact.orchestrator.orbits.control_plan import ControlPlan, ControlSettings, control_plan
 from vibroimpact.orchestrator.ssp import opened_scene
 
 _SHOWN = 8

@@ -208,7 +208,7 @@ def control(
     Example: vibroimpact control examples/bifurcation.toml --from 1 --to 0.7 -o kept.nc --figure kept.png
     """
     from vibroimpact.orchestrator.commands.control import show_control
-    from vibroimpact.orchestrator.orbits.control import settings_of
+    from vibroimpact.orchestrator.orbits.control_plan import settings_of
 
     settings = settings_of(
         law=law,

@@ -14,6 +14,7 @@ from support.places import EXAMPLES
 import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits import basins as basins_module
+from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 
 SCENE = EXAMPLES / "basins.toml"
 CHAIN = EXAMPLES / "thesis" / "figure_6_13.toml"
@@ -146,7 +147,7 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
 
 def test_ctrl_c_leaves_what_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(basins_module, "BLOCK", 500)
-    follow = basins_module.BodyFlow.follow
+    follow = BodyFlow.follow
     calls = [0]
 
     def interrupted(self: Any, states: Any, periods: int, *, first: bool = False) -> Any:
@@ -155,7 +156,7 @@ def test_ctrl_c_leaves_what_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyP
             raise KeyboardInterrupt
         return follow(self, states, periods, first=first)
 
-    monkeypatch.setattr(basins_module.BodyFlow, "follow", interrupted)
+    monkeypatch.setattr(BodyFlow, "follow", interrupted)
     done = in_this_process("basins", str(SCENE), "--points", "100", "-o", str(tmp_path / "b.nc"))
     assert done.returncode == 130
     assert "came near to no attractor that is known" in done.stdout

@@ -13,13 +13,9 @@ from support.places import EXAMPLES
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.orbits.control import (
-    Controlled,
-    ControlSettings,
-    control_plan,
-    coupled_scene,
-    run_plan,
-)
+from vibroimpact.orchestrator.orbits.control import Controlled, run_plan
+from vibroimpact.orchestrator.orbits.control_parts import coupled_scene
+from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
 
 pytest.importorskip("pythonfmu")
 

@@ -1,0 +1,142 @@
+"""Many states of a scene's body, followed from one phase 0 of the force to another by the loop in C."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.orbits.basins import Ends, Floats
+from vibroimpact.analysis.orbits.classify import RunClass, class_of
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.many import PointLoop, PointValues, PreparedPoints, loop_of
+from vibroimpact.orchestrator.run.many_rows import run_loop
+from vibroimpact.orchestrator.run.parameters import state_variables
+from vibroimpact.orchestrator.run.point import PointRunner
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+
+RECORDED = 64
+"""Forcing periods of which the class of a run is told."""
+_RECORD = {"transient_periods": 0, "recorded_periods": 1, "impacts": False}
+
+
+def start_names(scene: Scene) -> list[str]:
+    """Return the start values of the state of a scene's body, by their names in its FMU."""
+    if isinstance(scene.body, OscillatorBody):
+        return ["displacement_start", "velocity_start"]
+    return [name.replace("[", "_start[") for name in state_variables(scene)]
+
+
+class BodyFlow:
+    """Follows many states of a scene's body by the loop in C, on two threads and more."""
+
+    def __init__(self, scene: Scene, workers: int | None = None) -> None:
+        self.scene = scene
+        bare = {**_RECORD, "extrema": False, "strobe": False}
+        told = {**_RECORD, "extrema": True, "strobe": True}
+        self._pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+        count = self._pool._max_workers
+        self._runners: list[PointRunner] = []
+        self._bare = [self._loop(bare) for _ in range(count)]
+        self._telling = [self._loop(told) for _ in range(count)]
+        self.names = start_names(scene)
+
+    def _loop(self, record: dict[str, Any]) -> PointLoop:
+        scene = self.scene.with_values({"record": record, "execution.how": "auto"})
+        self._runners.append(PointRunner(scene))
+        loop = loop_of(scene, self._runners[-1])
+        if loop is None:
+            raise UsageError(
+                f"{self.scene.source}: basins: expected a body without measuring chain or deadline, got one with."
+            )
+        return loop
+
+    def close(self) -> None:
+        """Give back what was opened."""
+        self._pool.shutdown(cancel_futures=True)
+        for runner in self._runners:
+            runner.close()
+
+    def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
+        """Return where states are after some forcing periods: see `analysis.orbits.basins.Flow`."""
+        columns = self._run(self._bare, states, (0, periods), first=first)
+        outcome = np.concatenate([each.outcome for each in columns])
+        return Ends(
+            np.concatenate([_final(each) for each in columns]),
+            (outcome == Outcome.ok) | (outcome == Outcome.stuck),
+        )
+
+    def classes(
+        self, states: Floats, transient: int, *, first: bool = False
+    ) -> tuple[list[RunClass], Floats]:
+        """Return what a run from each state is after so many forcing periods, and its last states."""
+        columns = self._run(self._telling, states, (transient, RECORDED), first=first)
+        found = [kind for each in columns for kind in _classes(each)]
+        return found, np.concatenate([_final(each) for each in columns])
+
+    def _run(
+        self, loops: Sequence[PointLoop], states: Floats, periods: tuple[int, int], *, first: bool
+    ) -> list[RunColumns]:
+        parts = [part for part in np.array_split(states, len(loops)) if len(part)]
+        jobs = [
+            self._pool.submit(self._run_part, loop, part, periods, first)
+            for loop, part in zip(loops, parts, strict=False)
+        ]
+        return [job.result() for job in jobs]
+
+    def _run_part(self, loop: PointLoop, states: Floats, periods: tuple[int, int], first: bool) -> RunColumns:
+        points = self._prepared(loop, states, periods, first=first)
+
+        def alone(place: int, _: object) -> tuple[Any, None]:
+            return empty_record(loop.scene, Outcome.error, "refused", 0.0), None
+
+        return run_loop(loop, points, None, math.inf, alone)[0]
+
+    def _prepared(
+        self, loop: PointLoop, states: Floats, periods: tuple[int, int], *, first: bool
+    ) -> PreparedPoints:
+        one = loop.prepared(PointValues({}, np.ones(1, np.bool_)))
+        assert one is not None, "the scene has run"
+        names, count = loop.driver.float_names, len(states)
+        table = np.repeat(one.table, count, axis=0)
+        table[:, [names.index(name) for name in self.names]] = states
+        period = 2.0 * math.pi / one.columns["forcing.angular_frequency"][0]
+        start = float(one.begin[0]) if first else 0.0
+        if not first and "forcing.phase" in names:
+            table[:, names.index("forcing.phase")] = 0.0
+        begin = np.full(count, start + periods[0] * period)
+        return PreparedPoints(
+            np.ones(count, np.bool_),
+            table,
+            begin,
+            begin + periods[1] * period,
+            {name: table[:, place].copy() for place, name in enumerate(names)},
+            one.forced,
+            one.periods,
+        )
+
+
+def _final(columns: RunColumns) -> Floats:
+    if columns.final_state is not None:
+        return columns.final_state
+    return np.column_stack([columns.final_displacement, columns.final_velocity])
+
+
+def _classes(columns: RunColumns) -> list[RunClass]:
+    assert columns.periods is not None
+    table, sticks = columns.periods, columns.sticks
+    counts = np.zeros(len(columns), np.int64) if sticks is None else sticks.count
+    return [
+        class_of(
+            table[run, :, :4], table[run, :, 4], Outcome(int(columns.outcome[run])), bool(counts[run] > 0)
+        )
+        for run in range(len(columns))
+    ]
