@@ -62,11 +62,11 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.hardware.programs.sweep import measure_sweep as measure_sweep
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
-    from vibroimpact.orchestrator.orbits.basins import basins as basins
-    from vibroimpact.orchestrator.orbits.control import control as control
+    from vibroimpact.orbits import basins as basins
+    from vibroimpact.orbits import control as control
+    from vibroimpact.orbits import maps as maps
     from vibroimpact.orchestrator.orbits.energies import energies as energies
     from vibroimpact.orchestrator.orbits.lyapunov import lyapunov as lyapunov
-    from vibroimpact.orchestrator.orbits.maps import maps as maps
     from vibroimpact.orchestrator.orbits.resonances import resonances as resonances
     from vibroimpact.orchestrator.scene import Scene as Scene
     from vibroimpact.service.client import Service as Service
@@ -114,11 +114,9 @@ _NAMES = {
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
-    "orchestrator.orbits.basins": ("basins",),
-    "orchestrator.orbits.control": ("control",),
+    "orbits": ("basins", "control", "maps"),
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),
-    "orchestrator.orbits.maps": ("maps",),
     "orchestrator.orbits.resonances": ("resonances",),
     "orchestrator.scene": ("Scene",),
     "service.client": ("Service",),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
@@ -18,6 +17,7 @@ from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.given import PathLike, SceneLike, given_scene
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
@@ -33,16 +33,12 @@ from vibroimpact.orchestrator.ssp import (
     export_system,
     import_system,
     load_system,
-    opened_scene,
     refuse_system_elsewhere,
 )
 from vibroimpact.orchestrator.study import BUDGET, refuse_unreached, study_accuracy
 from vibroimpact.orchestrator.study import dataset_of as accuracy_dataset
 from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
 from vibroimpact.orchestrator.study.preparation import prepared_scene, with_found_modes
-
-SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
-PathLike = str | os.PathLike[str]
 
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -77,7 +73,7 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     >>> str(run(tables).outcome.item())
     '0'
     """
-    chosen, target = prepared_scene(_scene(scene)), None if path is None else _path(path)
+    chosen, target = prepared_scene(given_scene(scene)), None if path is None else _path(path)
     # NetCDF's library is not for several threads at once
     with _ONE_AT_A_TIME, _shown(progress) as shown:
         if target is not None:
@@ -139,7 +135,11 @@ def campaign(
         refuse_system_elsewhere(scene, scheduler)
     with _shown(progress) as shown:
         report = run_campaign(
-            prepared_scene(_scene(scene)), _path(folder), workers=workers, scheduler=scheduler, progress=shown
+            prepared_scene(given_scene(scene)),
+            _path(folder),
+            workers=workers,
+            scheduler=scheduler,
+            progress=shown,
         )
     return open_dataset(report.dataset)
 
@@ -188,7 +188,7 @@ def replay(
     """
     keys = fit if isinstance(fit, str) else ",".join(fit)
     whole = replay_scene(
-        _scene(scene), _paths(recordings), fit=keys or None, score=_paths(score), execution=execution
+        given_scene(scene), _paths(recordings), fit=keys or None, score=_paths(score), execution=execution
     )
     if path is not None:
         write_results(whole.dataset, _path(path), kind="replay")
@@ -235,7 +235,9 @@ def accuracy(
     >>> accuracy("examples/single_run.toml", tolerance=1e-6).attrs["chosen"]    # doctest: +SKIP
     'fused'
     """
-    study = study_accuracy(with_found_modes(_scene(scene)), tolerance=tolerance, quantity=of, budget=budget)
+    study = study_accuracy(
+        with_found_modes(given_scene(scene)), tolerance=tolerance, quantity=of, budget=budget
+    )
     dataset = accuracy_dataset(study)
     if path is not None:
         write_results(dataset, _path(path), kind="accuracy")
@@ -269,7 +271,7 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     >>> effects("examples/chatter.toml").attrs["not_simulated"].split(", ")[0]    # doctest: +SKIP
     'recorded drive'
     """
-    chosen = with_found_modes(_scene(scene))
+    chosen = with_found_modes(given_scene(scene))
     alone = chosen.with_sweep({}) if chosen.sweep else chosen
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
     if path is not None:
@@ -369,7 +371,7 @@ def find_orbits(
     P(1,1) [1.884299] True
     P(1,1) [0.787422] False
     """
-    return orbits_of_scene(_scene(scene), impacts, periods, seed=seed, penetrating=penetrating)
+    return orbits_of_scene(given_scene(scene), impacts, periods, seed=seed, penetrating=penetrating)
 
 
 def follow(
@@ -425,7 +427,7 @@ def follow(
     --------
     >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
     """
-    chosen = _scene(scene)
+    chosen = given_scene(scene)
     alone = chosen.with_sweep({}) if chosen.sweep else chosen
     if (second is None) != (second_range is None):
         raise UsageError("follow: second: expected a key and its range together, got one of them.")
@@ -492,7 +494,7 @@ def cost_of(scene: SceneLike) -> SceneCost:
     >>> cost_of({"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0}}).points
     1
     """
-    return scene_cost(with_found_modes(_scene(scene)))
+    return scene_cost(with_found_modes(given_scene(scene)))
 
 
 def export_fmu(
@@ -535,7 +537,7 @@ def export_fmu(
     >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
     """
     return export_scene(
-        with_found_modes(_scene(scene)),
+        with_found_modes(given_scene(scene)),
         _path(path),
         fmi=fmi,
         full=full,
@@ -589,7 +591,7 @@ def export_ssp(
     --------
     >>> export_ssp("two_oscillators.toml", "two.ssp")    # doctest: +SKIP
     """
-    return export_system(_scene(scene), _path(path), ssp=ssp, fmi=fmi, gains=gains, platform=platform)
+    return export_system(given_scene(scene), _path(path), ssp=ssp, fmi=fmi, gains=gains, platform=platform)
 
 
 def import_ssp(
@@ -629,23 +631,6 @@ def import_ssp(
         return load_system(_path(path), (), sets).scene
     import_system(_path(path), _path(output), (), sets)
     return Scene.from_file(output)
-
-
-def _scene(given: SceneLike) -> Scene:
-    if isinstance(given, Scene):
-        return given
-    if isinstance(given, Mapping):
-        return Scene.from_dict(given)
-    if isinstance(given, str) and "\n" in given:
-        raise UsageError(
-            "scene: expected the path of a file, got text of several lines. Scene.from_text reads it."
-        )
-    if isinstance(given, str | os.PathLike):
-        return opened_scene(given)
-    raise UsageError(
-        f"scene: expected a Scene, the path of one or its tables, got {type(given).__name__}. "
-        "Scene.from_text reads TOML text."
-    )
 
 
 def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:

@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
 from vibroimpact.analysis.figures.sweeps import edges
@@ -46,13 +45,9 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
             markersize=4.5,
             label=f"{names[place]}: {100.0 * share:.3g} %",
         )
-    patches = [
-        Patch(facecolor=colour, edgecolor="0.5", label=words)
-        for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop"))
-        if (labels == value).any()
-    ]
-    for patch in patches:
-        axis.add_patch(patch)
+    for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop")):
+        if (labels == value).any():
+            axis.plot([], [], "s", color=colour, markeredgecolor="black", markersize=4.5, label=words)
     axis.set(
         xlim=ends[0],
         ylim=ends[1],

@@ -96,10 +96,11 @@ def grazing_sets(body: ImpactingBody, points: int = 2000) -> GrazingSets:
     start = int(np.argmax(np.diff(grazes, append=grazes[0] + TURN))) + 1
     grazes = np.roll(grazes, -start % grazes.size)
     fastest = max(natural, 2.0 * decay, w)
-    after, after_velocity = _first_meeting(_Flight(body, grazes), 1.0, fastest)
-    before, before_velocity = _first_meeting(_Flight(body, grazes), -1.0, fastest)
-    # the flight that ends in the graze begins with -r V
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # backward a damped body comes from beyond all numbers, with no stop on its way
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        after, after_velocity = _first_meeting(_Flight(body, grazes), 1.0, fastest)
+        before, before_velocity = _first_meeting(_Flight(body, grazes), -1.0, fastest)
+        # the flight that ends in the graze begins with -r V
         speeds = np.where(before_velocity < 0.0, -before_velocity, np.nan) / contact.restitution
     speeds[~np.isfinite(speeds)] = np.nan
     for length, columns in ((after, (after_velocity,)), (before, (speeds,))):

@@ -117,7 +117,7 @@ def show_basins(
 def _say_rest(found: Basins, data: xr.Dataset) -> None:
     undecided = 1.0 - found.decided
     if undecided > 0.0:
-        say(f"{100.0 * undecided:.2g} % of the starts came near to no attractor that is known.")
+        say(f"{100.0 * undecided:.3g} % of the starts came near to no attractor that is known.")
     if found.told_by_sample:
         say(
             f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were."

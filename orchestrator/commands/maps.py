@@ -14,7 +14,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.commands.energies import write_found
 from vibroimpact.orchestrator.commands.failures import counted
-from vibroimpact.orchestrator.orbits.maps import HISTORY, MapSettings, maps
+from vibroimpact.orchestrator.orbits.maps import HISTORY, MapSettings, map_of
 from vibroimpact.orchestrator.ssp import opened_scene
 
 
@@ -32,10 +32,7 @@ def show_map(
         raise UsageError("--set: expected a scene to change, got none.")
     scene = None if path is None else opened_scene(path, changes)
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
-    options = {
-        name: getattr(settings, name) for name in ("span", "points", "alpha", "gamma", "restitution", "slope")
-    }
-    found = maps(scene, settings.kind, **options)
+    found = map_of(scene, settings)
     _tell(found)
     write_found(found.assign_attrs({} if path is None else {"scene_file": str(path)}), "maps", output, figure)
 

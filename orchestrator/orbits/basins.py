@@ -248,45 +248,6 @@ def _element(scene: Scene, number: int | None) -> str:
     return f" of {'mass' if isinstance(scene.body, ChainBody) else 'mode'} {place}"
 
 
-def basins(
-    scene: Scene,
-    x: Span | None = None,
-    y: Span | None = None,
-    points: tuple[int, int] = (POINTS, POINTS),
-    *,
-    number: int | None = None,
-) -> xr.Dataset:
-    """Find which attractor each start of a plane ends on.
-
-    Parameters
-    ----------
-    scene : Scene
-        An oscillator, a chain or a beam on restitution stops under a harmonic force.
-    x, y : tuple of float, optional
-        Ends of displacement (m) and velocity (m/s) at the start; those of the scene's own motion, twice as far.
-    points : tuple of int
-        Along both.
-    number : int, optional
-        Which mass of a chain, or mode of a beam, starts so: the mass that is hit first, mode 1; the others start as the
-        scene says.
-
-    Returns
-    -------
-    xarray.Dataset
-        `basin` on (velocity_start, displacement_start): numbers along `attractor`, -1 undecided, -2 beyond a stop; of
-        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, and its states at forcing phase 0.
-
-    Raises
-    ------
-    UsageError
-        The scene has no such orbits, or the plane no starts.
-    """
-    plane = Plane(x, y, points, number)
-    alone, across, along, found = prepare_basins(scene, plane)
-    run_basins(alone, found)
-    return basins_dataset(alone, plane, across, along, found)
-
-
 def run_basins(scene: Scene, found: Basins, told: Told | None = None) -> None:
     """Find where the starts end; `found` grows meanwhile."""
     flow = BodyFlow(scene)

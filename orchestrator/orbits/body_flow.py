@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.analysis.dataset import Outcome
-from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.dataset.columns import RunColumns, joined
 from vibroimpact.analysis.orbits.basins import Ends, Floats
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
@@ -25,6 +26,10 @@ from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
 RECORDED = 64
 """Forcing periods of which the class of a run is told."""
+SLICE = 0.25
+"""Time after which a thread looks whether it is still wanted, s: Ctrl-C waits no longer than that and one run."""
+DEADLINE = 20.0
+"""Longest time of one run, s: one that takes longer counts as one whose end is not known."""
 _RECORD = {"transient_periods": 0, "recorded_periods": 1, "impacts": False}
 
 
@@ -33,6 +38,10 @@ def start_names(scene: Scene) -> list[str]:
     if isinstance(scene.body, OscillatorBody):
         return ["displacement_start", "velocity_start"]
     return [name.replace("[", "_start[") for name in state_variables(scene)]
+
+
+class _Closing(Exception):
+    """Ends a thread whose work is no longer wanted."""
 
 
 class BodyFlow:
@@ -44,23 +53,26 @@ class BodyFlow:
         told = {**_RECORD, "extrema": True, "strobe": True}
         self._pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
         count = self._pool._max_workers
+        self._closing = False
         self._runners: list[PointRunner] = []
         self._bare = [self._loop(bare) for _ in range(count)]
         self._telling = [self._loop(told) for _ in range(count)]
         self.names = start_names(scene)
 
     def _loop(self, record: dict[str, Any]) -> PointLoop:
-        scene = self.scene.with_values({"record": record, "execution.how": "auto"})
+        limits = {"execution.how": "auto", "execution.deadline": DEADLINE}
+        scene = self.scene.with_values({"record": record, **limits})
         self._runners.append(PointRunner(scene))
         loop = loop_of(scene, self._runners[-1])
         if loop is None:
             raise UsageError(
-                f"{self.scene.source}: basins: expected a body without measuring chain or deadline, got one with."
+                f"{self.scene.source}: basins: expected a body without a measuring chain, got one with it."
             )
         return loop
 
     def close(self) -> None:
         """Give back what was opened."""
+        self._closing = True
         self._pool.shutdown(cancel_futures=True)
         for runner in self._runners:
             runner.close()
@@ -93,12 +105,17 @@ class BodyFlow:
         return [job.result() for job in jobs]
 
     def _run_part(self, loop: PointLoop, states: Floats, periods: tuple[int, int], first: bool) -> RunColumns:
-        points = self._prepared(loop, states, periods, first=first)
-
         def alone(place: int, _: object) -> tuple[Any, None]:
             return empty_record(loop.scene, Outcome.error, "refused", 0.0), None
 
-        return run_loop(loop, points, None, math.inf, alone)[0]
+        done: list[RunColumns] = []
+        while len(states):
+            if self._closing:
+                raise _Closing
+            points = self._prepared(loop, states, periods, first=first)
+            done.append(run_loop(loop, points, None, time.perf_counter() + SLICE, alone)[0])
+            states = states[len(done[-1]) :]
+        return joined(done)
 
     def _prepared(
         self, loop: PointLoop, states: Floats, periods: tuple[int, int], *, first: bool

@@ -17,17 +17,13 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import Row, described
-from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.orbits.control_parts import SEEN, coupled
 from vibroimpact.orchestrator.orbits.control_plan import (
     LONGEST_STAY,
     ControlPlan,
-    ControlSettings,
-    control_plan,
 )
 from vibroimpact.orchestrator.orbits.follow import scene_attributes
-from vibroimpact.orchestrator.scene import Scene
 
 HISTORY = "periodic orbits kept by vibroimpact"
 AT_THE_END = 20
@@ -211,63 +207,3 @@ def _dataset(found: Controlled) -> xr.Dataset:
 
 
 _UNITS = {"time": "s", "velocity": "m s-1", "force": "N", "rate": "rad s-1"}
-
-
-def control(
-    scene: Scene,
-    start: float,
-    stop: float,
-    *,
-    law: Law = "ogy",
-    step: float = 1e-4,
-    tolerance: float = 1e-4,
-    limit: float = 0.1,
-    noise: float = 0.0,
-    seed: int = 1,
-    periods: int = 1,
-    stay: int = 1,
-) -> xr.Dataset:
-    """Keep an orbit P(1,q) from one angular frequency to another by the forcing amplitude.
-
-    Parameters
-    ----------
-    scene : Scene
-        An oscillator on restitution stops under a harmonic force.
-    start, stop : float
-        Angular frequencies, rad/s.
-    law : {"ogy", "deadbeat", "newton"}
-        What is done about a deviation at an impact: the next one is put on the direction that comes back faster; the
-        orbit is reached two impacts later; as the first, about an orbit that is located from the last two impacts.
-    step : float
-        Of the angular frequency, rad/s.
-    tolerance : float
-        Difference of two speeds in a row, over that of the orbit, at which the frequency goes on.
-    limit : float
-        Largest correction over the forcing amplitude; 0: nothing is corrected.
-    noise : float
-        Standard deviation of the error of measured speeds, relative.
-    seed : int
-        Of the noise.
-    periods : int
-        q.
-    stay : int
-        Flights at each angular frequency at least.
-
-    Returns
-    -------
-    xarray.Dataset
-        Along `impact` what came (`impact_velocity`, `correction`, ...), along `orbit` what was to be kept; attributes
-        `kept_to` (rad/s) and `end` say how far it was kept and why not further, `branch_ends_at` where there is no
-        such orbit any more.
-
-    Raises
-    ------
-    UsageError
-        The scene has no orbits that this keeps.
-    OrbitError
-        There is none at the start.
-    ComponentError
-        pythonfmu is not installed.
-    """
-    settings = ControlSettings(law, step, tolerance, limit, noise, seed, periods, stay)
-    return run_plan(control_plan(scene, start, stop, settings)).dataset

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import Row, described
-from vibroimpact.analysis.orbits import ImpactingBody, PeriodicOrbit
+from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.grazing_sets import grazing_sets
 from vibroimpact.analysis.orbits.normal_forms import Nordmark, grazing_family, square_root_diagram
@@ -114,34 +114,16 @@ def settings_of(kind: str, **options: Any) -> MapSettings:
     return settings
 
 
-def maps(scene: Scene | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:
-    """Return a map of a scene as points to be drawn.
-
-    Parameters
-    ----------
-    scene : Scene, optional
-        A body on restitution stops under a harmonic force; `square-root`, and `nordmark` with alpha and gamma, need
-        none.
-    kind : {"impact", "strobe", "discontinuity", "nordmark", "square-root"}
-        Phase and velocity of the impacts of a long run, with the orbits P(1,1); states at forcing phase 0, likewise;
-        the sets S and W of impacts before and after a graze, of one mode (thesis figure 2.12); bifurcation diagrams of
-        Nordmark's map (2.18) and of the one-dimensional square-root map (2.19).
-    **options
-        `span`, `points`, `alpha`, `gamma`, `restitution`, `slope`: of the last two kinds, see `MapSettings`.
-
-    Returns
-    -------
-    xarray.Dataset
-        What `draw` draws.
+def map_of(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
+    """Return a map of a scene as points to be drawn; square-root, and nordmark with alpha and gamma, need no scene.
 
     Raises
     ------
     UsageError
-        There is no such map, or the scene has none.
+        The scene has no such map.
     OrbitError
         The body has several modes, where the map is one of one mode.
     """
-    settings = settings_of(kind, **options)
     if settings.kind == "square-root":
         found = _square_root(settings)
     elif settings.kind == "nordmark":
@@ -165,7 +147,10 @@ def _of_impacts(scene: Scene, settings: MapSettings) -> xr.Dataset:
     body = impacting_body(scene)
     plain = scene.units == "nondimensional"
     speed, metre, angle = ("1", "1", "1") if plain else ("m s-1", "m", "rad")
-    orbits = find_orbits(scene, 1, 1)
+    try:
+        orbits = find_orbits(scene, 1, 1)
+    except OrbitError:  # a body without losses has families of them, of which none is marked
+        orbits = []
     if settings.kind == "strobe":
         states = _run(scene, strobe=True)
         rows = _pairs(
