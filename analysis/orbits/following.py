@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
@@ -25,6 +24,7 @@ from vibroimpact.analysis.orbits.periodic import (
     evaluated,
     ordered,
 )
+from vibroimpact.analysis.orbits.sign_changes import determinant, passes_doubling, turning, turns_round
 
 MOST_NEWTON = 12
 EASY_NEWTON = 3
@@ -91,12 +91,12 @@ class BranchOrbit:
         scale = orbit.body.scale
         tests = {
             "fold": float(self.tangent[-1]),
-            "period doubling": _determinant(orbit.monodromy + np.eye(size)) * fast,
+            "period doubling": determinant(orbit.monodromy + np.eye(size)) * fast,
             "graze": float(orbit.velocities.min()),
             "graze between impacts": TOUCHES - max(orbit.highest[0] / scale, -1.0),
         }
         if size > 2:
-            tests["torus"] = _turning(orbit.multipliers)
+            tests["torus"] = turning(orbit.multipliers)
         return tests
 
 
@@ -225,10 +225,11 @@ class Follower:
                 continue
             events = sorted(self._events(now, taken, step), key=lambda pair: pair[0])
             for _, kind, at in events:
-                if kind == "end of the range":
-                    branch.orbits.append(at)
+                if kind not in at.tests:
                     branch.ends.append(kind)
-                    yield at
+                    if at is not now:
+                        branch.orbits.append(at)
+                        yield at
                     return
                 branch.points.append(SpecialPoint(kind, at, len(branch.orbits)))
                 branch.orbits.append(at)
@@ -309,13 +310,18 @@ class Follower:
     ) -> Iterator[tuple[float, str, BranchOrbit]]:
         settings = self.settings
         for kind in now.tests:
-            before, after = now.tests[kind], taken.tests[kind]
-            if np.sign(before) * np.sign(after) < 0.0 and np.isfinite(before + after):
+            sign, other = now.tests[kind], taken.tests[kind]
+            if np.sign(sign) * np.sign(other) < 0.0 and np.isfinite(sign + other):
                 found = self._located(now, step, _test_of(kind))
-                if found is not None and (kind != "torus" or _turns_round(found[1].orbit.multipliers)):
+                if found is not None and (kind != "torus" or turns_round(found[1].orbit.multipliers)):
                     yield found[0], kind, found[1]
+        if passes_doubling(now.orbit, taken.orbit):
+            once = f"P({now.orbit.phases.size // 2},{now.orbit.periods // 2})"
+            yield 0.0, f"period doubling of {once}", now
         for bound in (settings.lowest, settings.highest):
-            if (now.value - bound) * (taken.value - bound) < 0.0:
+            if now.value == bound and not settings.lowest <= taken.value <= settings.highest:
+                yield 0.0, "end of the range", now
+            elif (now.value - bound) * (taken.value - bound) < 0.0:
                 found = self._located(now, step, _beyond(bound))
                 if found is not None:
                     yield found[0], "end of the range", found[1]
@@ -372,20 +378,3 @@ def _is_closed(branch: Branch, now: BranchOrbit, longest: float) -> bool:
     apart = np.abs(ordered(now.orbit).phases - ordered(first.orbit).phases).max()
     near = apart < 2.0 * longest and abs(now.value - first.value) < 2.0 * longest * span
     return bool(near and now.tangent @ first.tangent > 0.9)
-
-
-def _determinant(matrix: Floats) -> float:
-    return float(np.linalg.det(matrix)) if np.isfinite(matrix).all() else float(np.nan)
-
-
-def _turning(multipliers: NDArray[np.complex128]) -> float:
-    """Return a product over all pairs of multipliers that is 0 where two are on the unit circle."""
-    i, j = np.triu_indices(multipliers.size, 1)
-    off = 1.0 - multipliers[i] * multipliers[j]
-    return float(np.prod(off / (1.0 + np.abs(off))).real)
-
-
-def _turns_round(multipliers: NDArray[np.complex128]) -> bool:
-    """Say whether two complex multipliers are on the unit circle, not two real ones whose product is 1."""
-    nearest = multipliers[np.argmin(np.abs(np.abs(multipliers) - 1.0))]
-    return bool(abs(nearest.imag) > 1e-6)

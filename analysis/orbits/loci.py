@@ -219,7 +219,10 @@ class LocusFollower:
             return "graze", found
         for place, settings in enumerate(self._ranges):
             for bound in (settings.lowest, settings.highest):
-                if (now.values[place] - bound) * (taken.values[place] - bound) < 0.0:
+                before, after = now.values[place], taken.values[place]
+                if before == bound and not settings.lowest <= after <= settings.highest:
+                    return "end of the range", None
+                if (before - bound) * (after - bound) < 0.0:
                     return "end of the range", self._located(locus.kind, now, step, _beyond(place, bound))
         if taken.orbit.highest[0] > TOUCHES * taken.orbit.body.scale >= now.orbit.highest[0]:
             return "graze between impacts", None
