@@ -68,6 +68,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.orchestrator.orbits.energies import energies as energies
     from vibroimpact.orchestrator.orbits.lyapunov import lyapunov as lyapunov
     from vibroimpact.orchestrator.orbits.resonances import resonances as resonances
+    from vibroimpact.orchestrator.orbits.seeds import seed_of_run as seed_of_run
     from vibroimpact.orchestrator.scene import Scene as Scene
     from vibroimpact.service.client import Service as Service
     from vibroimpact.simulation import accuracy as accuracy
@@ -118,6 +119,7 @@ _NAMES = {
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),
     "orchestrator.orbits.resonances": ("resonances",),
+    "orchestrator.orbits.seeds": ("seed_of_run",),
     "orchestrator.scene": ("Scene",),
     "service.client": ("Service",),
     "simulation": (

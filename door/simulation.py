@@ -381,13 +381,15 @@ def follow(
     stop: float,
     path: PathLike | None = None,
     *,
+    impacts: int | None = None,
     periods: int = 1,
+    seed: Sequence[tuple[float, int]] | None = None,
     doublings: int = 1,
     step: float = 0.01,
     second: str | None = None,
     second_range: tuple[float, float] | None = None,
 ) -> xr.Dataset:
-    """Follow the orbits P(1,q) of a scene over one of its numbers, through folds and period doublings.
+    """Follow periodic orbits of a scene over one of its numbers, through folds and period doublings.
 
     Parameters
     ----------
@@ -399,8 +401,11 @@ def follow(
         Its range.
     path : path, optional
         The dataset to write as well (.nc).
-    periods : int
-        q of the first orbits.
+    impacts, periods : int, optional
+        p and q of the orbits to begin with, which are looked for along the range; P(1,1).
+    seed : sequence of (phase, stop), optional
+        Forcing phases, rad, of impacts near to those of one orbit of the scene as it is, and their stops, from 1: that
+        orbit is followed both ways.
     doublings : int
         How often branches of twice the period are followed on.
     step : float
@@ -432,7 +437,15 @@ def follow(
     if (second is None) != (second_range is None):
         raise UsageError("follow: second: expected a key and its range together, got one of them.")
     followed = follow_branches(
-        alone, parameter, start, stop, periods=periods, doublings=doublings, longest=step
+        alone,
+        parameter,
+        start,
+        stop,
+        impacts=impacts,
+        periods=periods,
+        seed=seed,
+        doublings=doublings,
+        longest=step,
     )
     result: Followed | FollowedLoci = followed
     if second is not None and second_range is not None:

@@ -17,6 +17,7 @@ from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, FollowSet
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
+from vibroimpact.orchestrator.commands.beginning import Beginning, Begun
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.commands.orbit import multiplier_text
 from vibroimpact.orchestrator.orbits.follow import (
@@ -35,19 +36,20 @@ class Wanted:
 
     parameter: str
     span: tuple[float, float]
-    periods: int
+    beginning: Beginning
     doublings: int
     step: float
     second: str | None
     second_span: tuple[float | None, float | None]
 
     def refuse(self) -> None:
-        """Refuse half a second range.
+        """Refuse half a second range, and half a beginning.
 
         Raises
         ------
         UsageError
         """
+        self.beginning.refuse()
         given = (self.second is not None, *(end is not None for end in self.second_span))
         if any(given) and not all(given):
             raise UsageError(
@@ -70,15 +72,15 @@ def show_branches(
         Ctrl-C came; likewise.
     """
     wanted.refuse()
-    refuse_outputs([path], output, figure)
-    scene = opened_scene(path, changes)
+    refuse_outputs([path, *wanted.beginning.files], output, figure)
+    begun = wanted.beginning.begun(opened_scene(path, changes), changes)
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
-    followed = Followed(scene.with_sweep({}) if scene.sweep else scene, wanted.parameter)
+    followed = Followed(begun.scene, wanted.parameter)
     loci = FollowedLoci(followed, wanted.second or "")
     interrupted, failure = False, None
     with Terminal(stderr=True).status("Looking for orbits") as status:
         try:
-            _follow(wanted, followed, loci, status.update)
+            _follow(wanted, begun, followed, loci, status.update)
         except KeyboardInterrupt:
             interrupted = True
         except VibroimpactError as problem:
@@ -97,7 +99,9 @@ def show_branches(
         raise typer.Exit(130)
 
 
-def _follow(wanted: Wanted, followed: Followed, loci: FollowedLoci, show: Callable[[str], None]) -> None:
+def _follow(
+    wanted: Wanted, begun: Begun, followed: Followed, loci: FollowedLoci, show: Callable[[str], None]
+) -> None:
     def told(branch: Branch, orbit: BranchOrbit) -> None:
         if len(branch.orbits) % 20 == 1:
             many = counted(len(branch.orbits), "orbit")
@@ -107,7 +111,9 @@ def _follow(wanted: Wanted, followed: Followed, loci: FollowedLoci, show: Callab
         followed.scene,
         wanted.parameter,
         *wanted.span,
-        periods=wanted.periods,
+        impacts=begun.impacts,
+        periods=1 if begun.periods is None else begun.periods,
+        seed=begun.seed,
         doublings=wanted.doublings,
         longest=wanted.step,
         told=told,

@@ -12,9 +12,9 @@ from vibroimpact.analysis.dataset import write_dataset
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.branches import dataset_of_orbits
-from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.commands.beginning import Beginning
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.orbits.find import find_orbits
 from vibroimpact.orchestrator.orbits.follow import scene_attributes
@@ -28,42 +28,18 @@ HISTORY = "periodic orbits found by vibroimpact"
 class Wanted:
     """Orbits that are looked for, as options give them."""
 
-    impacts: int | None
-    periods: int | None
-    seed: str | None
+    beginning: Beginning
     penetrating: bool
-
-    @property
-    def impacts_of_seed(self) -> list[tuple[float, int]] | None:
-        """Phase and stop of each impact.
-
-        Raises
-        ------
-        UsageError
-            The text is none of these.
-        """
-        if self.seed is None:
-            return None
-        found = []
-        for each in self.seed.split(","):
-            phase, _, stop = each.partition(":")
-            try:
-                found.append((float(phase), int(stop or "1")))
-            except ValueError:
-                raise UsageError(
-                    f"--seed: expected phases in rad, each with :STOP where it is not 1, got {self.seed!r}. "
-                    'For example "0.5:1,3.6:2".'
-                ) from None
-        return found
 
     @property
     def text(self) -> str:
         """What they are called."""
-        if self.seed is not None:
+        given = self.beginning
+        if given.is_seed:
             return "near to the seed"
-        if self.impacts is None and self.periods is None:
+        if given.impacts is None and given.periods is None:
             return "P(1,1), and none that a long run ends on"
-        return f"P({self.impacts or 1},{self.periods or 1})"
+        return f"P({given.impacts or 1},{given.periods or 1})"
 
 
 def show_orbits(
@@ -75,11 +51,12 @@ def show_orbits(
     force: bool,
 ) -> None:
     """Find orbits, print them, and write and draw them where that was asked for."""
-    seed = wanted.impacts_of_seed
-    refuse_outputs([path], output, figure)
-    scene = opened_scene(path, changes)
+    wanted.beginning.refuse()
+    refuse_outputs([path, *wanted.beginning.files], output, figure)
+    found = wanted.beginning.begun(opened_scene(path, changes), changes)
+    scene = found.scene
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
-    orbits = find_orbits(scene, wanted.impacts, wanted.periods, seed=seed, penetrating=wanted.penetrating)
+    orbits = find_orbits(scene, found.impacts, found.periods, seed=found.seed, penetrating=wanted.penetrating)
     rows = table(
         f"Periodic orbits: {scene.title or scene.source}",
         *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),

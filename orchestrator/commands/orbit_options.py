@@ -10,6 +10,21 @@ import typer
 from vibroimpact.analysis.commands.shared_options import FigureFile, Force
 from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
+Seed = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PHASE:STOP,...",
+        help="Forcing phases (rad) of impacts near to those of an orbit, and their stops (1).",
+    ),
+]
+FromDataset = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Dataset (.nc, or the folder of a campaign) on the orbit of whose run it begins."
+    ),
+]
+Run = Annotated[int | None, typer.Option(help="run_index of that run, where there are several.", min=0)]
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands of orbits to the command line."""
@@ -21,13 +36,9 @@ def orbit(
     scene: SceneFile,
     impacts: Annotated[int | None, typer.Option(help="Impacts of an orbit.")] = None,
     periods: Annotated[int | None, typer.Option(help="Forcing periods of an orbit.")] = None,
-    seed: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PHASE:STOP,...",
-            help="Forcing phases (rad) of impacts near to those of an orbit, and their stops (1).",
-        ),
-    ] = None,
+    seed: Seed = None,
+    from_dataset: FromDataset = None,
+    run: Run = None,
     penetrating: Annotated[
         bool, typer.Option("--penetrating", help="Tell orbits that pass through a stop as well.")
     ] = False,
@@ -39,14 +50,15 @@ def orbit(
     """Find periodic orbits of a scene, stable and unstable ones, and say what their multipliers are.
 
     Without --impacts and --periods all orbits of one impact a period, and the orbit that a long run ends on; with
-    --seed the orbit near to it. Each is nowhere beyond a stop: all maxima between its impacts are found, the nearest to
-    a stop is told.
+    --seed or --from-dataset the orbit near to it. Each is nowhere beyond a stop: all maxima between its impacts are
+    found, the nearest to a stop is told.
 
     Example: vibroimpact orbit examples/bifurcation.toml --set "sweep={}" --impacts 2 --periods 2 --figure orbits.png
     """
+    from vibroimpact.orchestrator.commands.beginning import Beginning
     from vibroimpact.orchestrator.commands.orbit import Wanted, show_orbits
 
-    wanted = Wanted(impacts, periods, seed, penetrating)
+    wanted = Wanted(Beginning(impacts, periods, seed, from_dataset, run), penetrating)
     show_orbits(scene, wanted, changes or (), output, figure, force)
 
 
@@ -57,9 +69,13 @@ def follow(
     stop: Annotated[float, typer.Option("--to", help="The other end.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
     figure: FigureFile = None,
+    impacts: Annotated[int | None, typer.Option(help="Impacts of the orbits to begin with (1).")] = None,
     periods: Annotated[
-        int, typer.Option(help="Forcing periods of the orbits of one impact that are followed.")
-    ] = 1,
+        int | None, typer.Option(help="Forcing periods of the orbits to begin with (1).")
+    ] = None,
+    seed: Seed = None,
+    from_dataset: FromDataset = None,
+    run: Run = None,
     doublings: Annotated[
         int, typer.Option(help="How often branches of twice the period are followed on.")
     ] = 1,
@@ -76,14 +92,17 @@ def follow(
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
     Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
-    and the force harmonic. With --second the folds, period doublings and grazes are curves over both numbers, and
-    these are what is written and drawn.
+    and the force harmonic. Orbits to begin with are looked for along the range; --seed is one of the scene as it is,
+    --from-dataset one at the values of its run. With --second the folds, period doublings and grazes are curves over
+    both numbers, and these are what is written and drawn.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """
+    from vibroimpact.orchestrator.commands.beginning import Beginning
     from vibroimpact.orchestrator.commands.follow import Wanted, show_branches
 
-    wanted = Wanted(parameter, (start, stop), periods, doublings, step, second, (second_start, second_stop))
+    begun = Beginning(impacts, periods, seed, from_dataset, run)
+    wanted = Wanted(parameter, (start, stop), begun, doublings, step, second, (second_start, second_stop))
     show_branches(scene, wanted, changes or (), output, figure, force)
 
 

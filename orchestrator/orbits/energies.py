@@ -11,7 +11,6 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import Row, described
-from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.energies import (
     OrbitEnergies,
@@ -23,7 +22,7 @@ from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.campaign.progress import Progress
-from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, scene_of
+from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, place_of, scene_of, why_without_orbit
 
 _OF_MODES: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], Floats]]] = {
     "residual_energy": ("J", "work of the force less loss to damping", lambda e: e.residual),
@@ -95,7 +94,7 @@ def energies(
             return energies(opened, run, progress=progress)
     scene = scene_of(dataset, "energies")
     runs = dataset.vibroimpact.runs
-    chosen = _chosen(runs, run)
+    chosen = range(runs.sizes["run"]) if run is None else [place_of(runs, run, "energies")]
     impacts = ImpactsOf(dataset)
     bodies = Bodies(scene, runs)
     seen = progress if progress is not None and len(chosen) >= _MANY else Progress()
@@ -116,28 +115,11 @@ def energies(
     return made.assign_attrs(kept)
 
 
-def _chosen(runs: xr.Dataset, run: int | None) -> list[int]:
-    if run is None:
-        return list(range(runs.sizes["run"]))
-    there = np.flatnonzero(runs["run_index"].values == run)
-    if not there.size:
-        known = runs["run_index"].values
-        raise DatasetError(
-            f"energies: run: expected one of run_index {known.min()} to {known.max()}, got {run}."
-        )
-    return [int(there[0])]
-
-
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:
     """Return the energies of a run, or why it has none, and how far its impacts are from its orbit."""
     body = bodies[place]
-    outcome = Outcome(int(runs["outcome"].values[place]))
-    if outcome is not Outcome.ok:
-        return f"outcome {outcome.name}", np.nan
-    if "stick_count" in runs and runs["stick_count"].values[place] > 0:
-        return "sticking: impacts without number", np.nan
-    if "impacts_per_period" in runs and np.isinf(runs["impacts_per_period"].values[place]).any():
-        return "chatter: impacts without number", np.nan
+    if reason := why_without_orbit(runs, place):
+        return reason, np.nan
     try:
         near = recorded_orbit(body, impacts[int(runs["run_id"].values[place])])
         return orbit_energies(near.orbit), near.distance

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.search import orbits_of, same_orbit
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
@@ -19,10 +18,6 @@ TRANSIENT = 2000
 """Forcing periods that a run is given to come to its orbit."""
 REPEATS = 1e-4
 """Difference of phases, rad, up to which a run has come near to an orbit; Newton's method does the rest."""
-
-
-Seed = Sequence[tuple[float, int]]
-"""Forcing phase, rad, and stop, from 1, of each impact of a train to begin with."""
 
 
 def find_orbits(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, closed_form
+from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.branches import dataset_of_branches, dataset_of_loci
 from vibroimpact.analysis.orbits.following import (
     Branch,
@@ -21,17 +21,17 @@ from vibroimpact.analysis.orbits.following import (
     joined,
 )
 from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
-from vibroimpact.analysis.orbits.periodic import ordered
+from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits
+from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
 HISTORY = "periodic orbits followed by vibroimpact"
-SEEDS = 25
-"""Values of the parameter at which orbits are looked for to begin with."""
 SAME_ORBIT = 0.02
 """Distance, over the range of the parameter and a radian, at which an orbit is on a branch that is known."""
 
@@ -184,13 +184,15 @@ def follow_branches(
     start: float,
     stop: float,
     *,
+    impacts: int | None = None,
     periods: int = 1,
+    seed: Seed | None = None,
     doublings: int = 1,
     longest: float = 0.01,
     told: Told = lambda branch, orbit: None,
     followed: Followed | None = None,
 ) -> Followed:
-    """Follow the orbits of one impact in `periods` forcing periods, and those that leave them at period doublings.
+    """Follow orbits P(p,q), and those that leave them at period doublings.
 
     Parameters
     ----------
@@ -200,8 +202,11 @@ def follow_branches(
         Key of a number of the scene.
     start, stop : float
         Range of the parameter.
-    periods : int
-        q of the first P(1,q).
+    impacts, periods : int, optional
+        p and q of the first orbits: P(1,q), or as many impacts as the seed has.
+    seed : sequence of (phase, stop), optional
+        Impacts near to those of one orbit of the scene as it is, phases ascending within `periods`: that orbit alone is
+        followed.
     doublings : int
         How often branches of twice the period are followed on.
     longest : float
@@ -218,16 +223,17 @@ def follow_branches(
     OrbitError
         There is no orbit to begin with.
     """
-    _refuse(start, stop, periods, doublings, longest)
+    _refuse(start, stop, impacts, periods, doublings, longest)
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower, result = Follower(body_at, settings), followed or Followed(scene, parameter)
-    for value, orbit in _seeds(body_at, settings, periods):
+    begun = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed)
+    for value, orbit in begun:
         if not _is_known(result.branches, orbit, value, settings):
             _both_ways(follower, orbit, value, result, told)
     if not result.branches:
         raise OrbitError(
-            f"follow: expected a physical orbit P(1,{periods}) at one of {SEEDS} values of {parameter} "
+            f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of {parameter} "
             f"from {settings.lowest:g} to {settings.highest:g}, got none. Try another range, or other periods."
         )
     _doubled(follower, result, doublings, told)
@@ -295,38 +301,32 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
     return body_at
 
 
-def _seeds(
-    body_at: Callable[[float], ImpactingBody], settings: FollowSettings, periods: int
-) -> Iterator[tuple[float, PeriodicOrbit]]:
-    for value in np.linspace(settings.lowest, settings.highest, SEEDS + 2)[1:-1]:
-        body = body_at(float(value))
-        for contact in range(len(body.contacts)):
-            try:
-                found = closed_form(body, periods, contact)
-            except OrbitError:
-                continue  # a resonance at this very value
-            yield from ((float(value), orbit) for orbit in found if orbit.is_physical and orbit.turns == 1)
-
-
 def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:
-    at = np.append(ordered(orbit).phases, value / settings.span)
+    """Say whether an orbit is on a branch, counted from any of its impacts and periods."""
+    whole = 2.0 * np.pi * orbit.periods
     for branch in branches:
         alike = branch.orbits[0].orbit
-        if alike.periods != orbit.periods or list(ordered(alike).contacts) != list(orbit.contacts):
+        if alike.periods != orbit.periods or alike.phases.size != orbit.phases.size:
             continue
-        rows = np.array(
-            [np.append(ordered(each.orbit).phases, each.value / settings.span) for each in branch.orbits]
-        )
-        apart = rows - at
-        apart[:, :-1] = np.abs(np.mod(apart[:, :-1] + np.pi, 2.0 * np.pi) - np.pi)
-        if np.hypot.reduce(apart, axis=1).min() < SAME_ORBIT:
-            return True
+        rows = np.array([each.orbit.phases for each in branch.orbits])
+        off = (branch.values - value) / settings.span
+        for first in range(orbit.phases.size):
+            if (np.roll(orbit.contacts, -first) != alike.contacts).any():
+                continue
+            apart = rows - np.append(orbit.phases[first:], orbit.phases[:first] + whole)
+            apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
+            if np.hypot(np.hypot.reduce(apart, axis=1), off).min() < SAME_ORBIT:
+                return True
     return False
 
 
-def _refuse(start: float, stop: float, periods: int, doublings: int, longest: float) -> None:
+def _refuse(
+    start: float, stop: float, impacts: int | None, periods: int, doublings: int, longest: float
+) -> None:
     if not (np.isfinite(start) and np.isfinite(stop) and start != stop):
         raise UsageError(f"--from, --to: expected two different numbers, got {start:g} and {stop:g}.")
+    if not (impacts is None or 1 <= impacts <= MOST_IMPACTS):
+        raise UsageError(f"--impacts: expected 1 to {MOST_IMPACTS}, got {impacts}.")
     if not periods >= 1:
         raise UsageError(f"--periods: expected 1 or more, got {periods}.")
     if not doublings >= 0:

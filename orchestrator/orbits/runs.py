@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.orbits.body import ImpactingBody
 from vibroimpact.analysis.orbits.recorded import Impacts
 from vibroimpact.fmus.errors import DatasetError
@@ -24,6 +25,29 @@ def scene_of(dataset: xr.Dataset, who: str) -> Scene:
     if "scene" not in dataset.attrs:
         raise DatasetError(f"{who}: expected the scene text in the attribute scene, got none.")
     return parse_scene(str(dataset.attrs["scene"]), "scene of the dataset")
+
+
+def place_of(runs: xr.Dataset, run: int, who: str) -> int:
+    """Return where in a table of runs a run_index is."""
+    there = np.flatnonzero(runs["run_index"].values == run)
+    if not there.size:
+        known = runs["run_index"].values
+        raise DatasetError(
+            f"{who}: run: expected one of run_index {known.min()} to {known.max()}, got {run}."
+        )
+    return int(there[0])
+
+
+def why_without_orbit(runs: xr.Dataset, place: int) -> str:
+    """Return why a run cannot have an orbit of finitely many impacts; empty where it may."""
+    outcome = Outcome(int(runs["outcome"].values[place]))
+    if outcome is not Outcome.ok:
+        return f"outcome {outcome.name}"
+    if "stick_count" in runs and runs["stick_count"].values[place] > 0:
+        return "sticking: impacts without number"
+    if "impacts_per_period" in runs and np.isinf(runs["impacts_per_period"].values[place]).any():
+        return "chatter: impacts without number"
+    return ""
 
 
 class ImpactsOf:

@@ -1,0 +1,111 @@
+"""The orbits of a scene that branches begin at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit, closed_form
+from vibroimpact.analysis.orbits.following import BodyAt, FollowSettings
+from vibroimpact.analysis.orbits.search import orbits_of
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.find import find_orbits
+from vibroimpact.orchestrator.orbits.seeds import Seed
+from vibroimpact.orchestrator.scene import Scene
+
+SEEDS = 25
+"""Values of the parameter at which orbits are looked for to begin with."""
+
+
+def first_orbits(
+    body_at: BodyAt,
+    scene: Scene,
+    parameter: str,
+    settings: FollowSettings,
+    impacts: int | None,
+    periods: int,
+    seed: Seed | None,
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    """Return values of the parameter and a physical orbit at each; several may lie on one branch.
+
+    Parameters
+    ----------
+    body_at : callable
+        Body for a value of the parameter.
+    scene : Scene
+        Whose own value of the parameter a seed belongs to.
+    parameter : str
+        Key of the scene.
+    settings : FollowSettings
+        Range of the parameter.
+    impacts, periods : int, optional
+        p and q; one impact, or as many as the seed has.
+    seed : sequence of (phase, stop), optional
+        Impacts near to those of the only orbit.
+
+    Raises
+    ------
+    UsageError
+        There is no such seed in the scene or in the range.
+    OrbitError
+        There is no physical orbit near to the seed.
+    """
+    if seed is not None:
+        yield _of_seed(scene, parameter, settings, seed, impacts, periods)
+    elif impacts in (None, 1):
+        yield from _of_one_impact(body_at, settings, periods)
+    else:
+        yield from _of_many_impacts(body_at, scene, parameter, settings, impacts, periods)
+
+
+def _values(settings: FollowSettings) -> list[float]:
+    """Return values of the parameter at which orbits are looked for."""
+    return [float(each) for each in np.linspace(settings.lowest, settings.highest, SEEDS + 2)[1:-1]]
+
+
+def _of_one_impact(
+    body_at: BodyAt, settings: FollowSettings, periods: int
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    for value in _values(settings):
+        body = body_at(value)
+        for contact in range(len(body.contacts)):
+            try:
+                found = closed_form(body, periods, contact)
+            except OrbitError:
+                continue  # a resonance at this very value
+            yield from ((value, orbit) for orbit in found if orbit.is_physical and orbit.turns == 1)
+
+
+def _of_many_impacts(
+    body_at: BodyAt,
+    scene: Scene,
+    parameter: str,
+    settings: FollowSettings,
+    impacts: int,
+    periods: int,
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    """Return orbits at values of the range, first at the scene's own: a branch may lie between the others."""
+    own = float(scene.value(parameter))
+    inside = [own] if settings.lowest <= own <= settings.highest else []
+    for value in [*inside, *_values(settings)]:
+        yield from ((value, orbit) for orbit in orbits_of(body_at(value), impacts, periods))
+
+
+def _of_seed(
+    scene: Scene, parameter: str, settings: FollowSettings, seed: Seed, impacts: int | None, periods: int
+) -> tuple[float, PeriodicOrbit]:
+    value = float(scene.value(parameter))
+    if not settings.lowest <= value <= settings.highest:
+        raise UsageError(
+            f"--from, --to: expected a range around {parameter} = {value:g} of the scene, to which the seed belongs, "
+            f"got {settings.lowest:g} to {settings.highest:g}."
+        )
+    (orbit,) = find_orbits(scene, impacts, periods, seed=seed)
+    if not orbit.is_physical:
+        beyond, _, contact = orbit.highest
+        raise OrbitError(
+            f"follow: expected a physical orbit near to the seed, got a {orbit.name} that passes through stop "
+            f"{contact + 1} by {beyond:.3g}. Try another seed."
+        )
+    return value, orbit
