@@ -2,7 +2,7 @@
 
 The unknowns are the phases of the impacts and both parameters; beside the equations of the orbit there is one more,
 the function whose sign change the bifurcation is. A locus that comes to an impact of no speed has come to a graze too:
-a point of codimension 2.
+a point of codimension 2. So is a graze between impacts at which another maximum touches a stop as well.
 """
 
 from __future__ import annotations
@@ -24,11 +24,15 @@ from vibroimpact.analysis.orbits.following import (
     FollowSettings,
     SpecialPoint,
 )
-from vibroimpact.analysis.orbits.periodic import TOUCHES, OrbitError, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
 
-FOLLOWED_KINDS = ("fold", "period doubling", "graze")
+FOLLOWED_KINDS = ("fold", "period doubling", "graze", "graze between impacts")
+JUMP = 0.5
+"""Change of the phase of the highest maximum, rad, from which on it is another one."""
 CHANGE = 1e-6
 """Of an unknown, by which derivatives are found; an error of theirs costs a Newton step, and no digit."""
+SLOW = 1e-5
+"""Speed of an impact, over the fastest, below which a locus of another kind ends for its sake."""
 CLOSED = 1e-13
 """Change of the unknowns at which they are found."""
 
@@ -59,10 +63,11 @@ class Locus:
     Attributes
     ----------
     kind : str
-        `fold`, `period doubling` or `graze`.
+        `fold`, `period doubling`, `graze` or `graze between impacts`.
     points : list of LocusPoint
     special : list of tuple of (str, LocusPoint)
-        Points of codimension 2: `graze`, an impact of no speed on a fold or a period doubling.
+        Points of codimension 2: `graze` or `graze between impacts` on a locus of another kind; `another`, a second
+        graze between impacts.
     ends : list of str
     """
 
@@ -109,7 +114,7 @@ class LocusFollower:
     ) -> Iterator[LocusPoint]:
         """Follow one way, towards higher (+1) or lower (-1) values of the second parameter at first."""
         if locus.kind not in FOLLOWED_KINDS:
-            raise OrbitError(f"loci: expected a fold, a period doubling or a graze, got a {locus.kind}.")
+            raise OrbitError(f"loci: expected a {', a '.join(FOLLOWED_KINDS)}, got a {locus.kind}.")
         unknowns = np.concatenate([at.orbit.phases, np.array(values) / self._spans])
         tangent = self._tangent(locus.kind, at.orbit, unknowns)
         if tangent[-1] * sign < 0.0:
@@ -124,7 +129,7 @@ class LocusFollower:
             if found is None:
                 step *= 0.5
                 if step < SHORTEST * longest:
-                    locus.ends.append("cannot be followed further")
+                    locus.ends.append(self._why_no_further(locus, now, 1e-3 * longest))
                     return
                 continue
             taken, newton = found
@@ -154,6 +159,9 @@ class LocusFollower:
         made, distances, slopes = self._made(orbit, unknowns)
         if kind == "graze":
             test = float(made.velocities.min())
+        elif kind == "graze between impacts":
+            beyond, _, contact = made.highest
+            test = beyond / made.body.scale if contact >= 0 else np.nan
         elif kind == "fold":
             test = float(np.linalg.det(slopes / made.body.scale))
         else:
@@ -162,7 +170,7 @@ class LocusFollower:
             known = np.isfinite(made.monodromy).all()
             test = float(np.linalg.det(made.monodromy + np.eye(size))) * fast if known else np.nan
         if not np.isfinite(test):
-            raise OrbitError("loci: an impact of no speed has no multipliers.")
+            raise OrbitError("loci: expected impacts with a speed, and a maximum between them; got none.")
         return np.append(distances / made.body.scale, test)
 
     def _slopes(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
@@ -179,7 +187,9 @@ class LocusFollower:
     def _tangent(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
         return np.asarray(np.linalg.svd(self._slopes(kind, orbit, unknowns))[2][-1], dtype=np.float64)
 
-    def _step(self, kind: str, now: LocusPoint, step: float) -> tuple[LocusPoint, int] | None:
+    def _step(
+        self, kind: str, now: LocusPoint, step: float, most_turn: float = MOST_TURN
+    ) -> tuple[LocusPoint, int] | None:
         start = np.concatenate([now.orbit.phases, np.array(now.values) / self._spans])
         unknowns = start + step * now.tangent
         try:
@@ -202,7 +212,7 @@ class LocusFollower:
             return None
         if tangent @ now.tangent < 0.0:
             tangent = -tangent
-        if tangent @ now.tangent < np.cos(MOST_TURN):
+        if tangent @ now.tangent < np.cos(most_turn):
             return None
         values = unknowns[-2:] * self._spans
         return LocusPoint((float(values[0]), float(values[1])), orbit, tangent), newton
@@ -214,9 +224,14 @@ class LocusFollower:
     ) -> tuple[str, LocusPoint | None] | None:
         """Return why a locus ends between two points, and the last one; None where it goes on."""
         if locus.kind != "graze" and taken.orbit.velocities.min() <= 0.0 < now.orbit.velocities.min():
-            found = self._last_with_speed(locus.kind, now, step)
+            found = self._last(locus.kind, now, step, lambda each: each.orbit.velocities.min() > 0.0)
             locus.special.append(("graze", found))
             return "graze", found
+        between = locus.kind == "graze between impacts"
+        if between and _is_other_maximum(now, taken):
+            found = self._last(locus.kind, now, step, lambda each: not _is_other_maximum(now, each))
+            locus.special.append(("another", found))
+            return "another graze between impacts", found
         for place, settings in enumerate(self._ranges):
             for bound in (settings.lowest, settings.highest):
                 before, after = now.values[place], taken.values[place]
@@ -224,17 +239,54 @@ class LocusFollower:
                     return "end of the range", None
                 if (before - bound) * (after - bound) < 0.0:
                     return "end of the range", self._located(locus.kind, now, step, _beyond(place, bound))
-        if taken.orbit.highest[0] > TOUCHES * taken.orbit.body.scale >= now.orbit.highest[0]:
-            return "graze between impacts", None
+        if not between and taken.orbit.highest[0] > TOUCHES * taken.orbit.body.scale >= now.orbit.highest[0]:
+            touch = self._located(locus.kind, now, step, _beyond_stop)
+            if touch is not None:
+                locus.special.append(("graze between impacts", touch))
+            return "graze between impacts", touch
         return None
 
-    def _last_with_speed(self, kind: str, now: LocusPoint, step: float) -> LocusPoint:
-        """Return the last orbit of a step whose impacts all have a speed, without which there are no multipliers."""
+    def _why_no_further(self, locus: Locus, now: LocusPoint, step: float) -> str:
+        """Return why a locus ends where no step is short enough; with a graze between impacts a point may be known."""
+        if locus.kind != "graze between impacts":
+            return "cannot be followed further"
+        slow = now.orbit.velocities.min() / now.orbit.velocities.max()
+        if slow < SLOW:
+            locus.special.append(("graze", self._without_speed(locus)))
+            return "graze"
+        found = self._step(locus.kind, now, step, most_turn=0.5 * np.pi)  # beyond a corner of two maxima
+        if found is not None and _is_other_maximum(now, found[0]):
+            locus.special.append(("another", now))
+            return "another graze between impacts"
+        return "cannot be followed further"
+
+    def _without_speed(self, locus: Locus) -> LocusPoint:
+        """Return where an impact has no speed, along the line through points next to it.
+
+        An impact that is slower than derivatives are fine has a maximum beside it, and the locus cannot be followed on.
+        """
+        now = locus.points[-1]
+        slowest = now.orbit.velocities.min()
+        faster = [each for each in locus.points if each.orbit.velocities.min() > 10.0 * slowest]
+        before = faster[-1] if faster else locus.points[0]
+        rows = [
+            np.concatenate([each.orbit.phases, np.array(each.values) / self._spans]) for each in (before, now)
+        ]
+        part = slowest / (before.orbit.velocities.min() - slowest)
+        unknowns = rows[1] + part * (rows[1] - rows[0])
+        values = unknowns[-2:] * self._spans
+        orbit = self._made(now.orbit, unknowns)[0]
+        return LocusPoint((float(values[0]), float(values[1])), orbit, now.tangent)
+
+    def _last(
+        self, kind: str, now: LocusPoint, step: float, holds: Callable[[LocusPoint], bool]
+    ) -> LocusPoint:
+        """Return the last point of a step for which something holds: beyond it there may be no points."""
         part, beyond, last = 0.0, step, now
         while beyond - part > LOCATED * step:
             middle = 0.5 * (part + beyond)
             found = self._step(kind, now, middle)
-            if found is None or not found[0].orbit.velocities.min() > 0.0:
+            if found is None or not holds(found[0]):
                 beyond = middle
             else:
                 part, last = middle, found[0]
@@ -267,3 +319,16 @@ def joined_loci(backward: Locus, forward: Locus) -> Locus:
 
 def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
     return lambda point: point.values[place] - bound
+
+
+def _beyond_stop(point: LocusPoint) -> float:
+    """Return how far the highest maximum is beyond its stop, over the size of the motion; at least -1."""
+    return max(point.orbit.highest[0] / point.orbit.body.scale, -1.0) - TOUCHES
+
+
+def _is_other_maximum(one: LocusPoint, other: LocusPoint) -> bool:
+    """Say whether the highest maximum between impacts of one orbit is not that of the other."""
+    (_, at, contact), (_, at_other, contact_other) = one.orbit.highest, other.orbit.highest
+    whole = TURN * one.orbit.periods
+    moved = (at_other - other.orbit.phases[0]) - (at - one.orbit.phases[0])
+    return contact != contact_other or abs(np.mod(moved + 0.5 * whole, whole) - 0.5 * whole) > JUMP

@@ -20,7 +20,10 @@ def determinant(matrix: Floats) -> float:
 def turning(multipliers: NDArray[np.complex128]) -> float:
     """Return a product over all pairs of multipliers that is 0 where two are on the unit circle."""
     i, j = np.triu_indices(multipliers.size, 1)
-    off = 1.0 - multipliers[i] * multipliers[j]
+    with np.errstate(over="ignore", invalid="ignore"):  # next to a graze
+        off = 1.0 - multipliers[i] * multipliers[j]
+    if not np.isfinite(off).all():
+        return float(np.nan)
     return float(np.prod(off / (1.0 + np.abs(off))).real)
 
 

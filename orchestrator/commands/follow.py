@@ -92,6 +92,10 @@ def show_branches(
     _print(followed)
     _print_loci(loci)
     _write(loci if loci.loci else followed, output, figure)
+    if loci.loci and output is not None:
+        say(f"{output} has the curves over both numbers; branches are written without --second.")
+    elif wanted.second is not None and not loci.loci and output is not None:
+        say(f"No curves over {wanted.second} were found: {output} has the branches.")
     if failure is not None:
         raise failure
     if interrupted:

@@ -93,8 +93,8 @@ def follow(
 
     Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
     and the force harmonic. Orbits to begin with are looked for along the range; --seed is one of the scene as it is,
-    --from-dataset one at the values of its run. With --second the folds, period doublings and grazes are curves over
-    both numbers, and these are what is written and drawn.
+    --from-dataset one at the values of its run. With --second folds, period doublings and grazes are curves over both
+    numbers, and these are what is written and drawn; the branches are printed.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """

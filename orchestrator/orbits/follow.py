@@ -122,7 +122,7 @@ def follow_loci(
     *,
     told: Callable[[Locus], None] = lambda locus: None,
 ) -> FollowedLoci:
-    """Follow each fold, period doubling and graze of the branches over a second parameter of the scene.
+    """Follow folds, period doublings and grazes of the branches over a second parameter of the scene.
 
     Parameters
     ----------

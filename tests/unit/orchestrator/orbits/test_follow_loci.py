@@ -1,0 +1,86 @@
+"""Grazes between impacts followed over two numbers of a scene, and the points of codimension 2 on their curves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.command_line import in_this_process
+from support.places import ROOT
+
+import vibroimpact as vi
+from vibroimpact.analysis.dataset.schema import SpecialOrbit
+from vibroimpact.analysis.orbits.following import FollowSettings
+from vibroimpact.orchestrator.orbits.follow import FollowedLoci, follow_branches, follow_loci
+
+CHAIN = ROOT / "examples" / "thesis" / "figure_6_13.toml"
+PARAMETER = "forcing.angular_frequency"
+POSITION = "stop[1].position"
+
+
+def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings() -> None:
+    loci = vi.follow(
+        CHAIN, PARAMETER, 0.8, 0.9, doublings=0, second=POSITION, second_range=(0.03, 0.2), step=0.05
+    ).vibroimpact.runs
+    assert set(loci["orbit_special"].values) == {SpecialOrbit.graze_between_impacts}
+    for place in (1, loci.sizes["run"] // 2, loci.sizes["run"] - 2):
+        position, frequency = float(loci["position"][place]), float(loci["angular_frequency"][place])
+        scene = vi.Scene.from_file(CHAIN).with_values({POSITION: position})
+        alone = vi.follow(scene, PARAMETER, frequency - 0.02, frequency + 0.05, doublings=0, step=0.1)
+        runs = alone.vibroimpact.runs
+        found = runs["angular_frequency"].values[
+            runs["orbit_special"].values == SpecialOrbit.graze_between_impacts
+        ]
+        assert np.abs(found - frequency).min() < 1e-9
+
+
+def curves_of_grazes_between_impacts(scene: vi.Scene, impacts: int) -> FollowedLoci:
+    branches = follow_branches(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, longest=0.05)
+    for branch in branches.branches:
+        branch.points = [point for point in branch.points if point.kind == "graze between impacts"][:1]
+    ranges = FollowSettings(0.4, 0.52, 0.03), FollowSettings(0.09, 0.6, 0.03)
+    return follow_loci(FollowedLoci(branches, POSITION), *ranges)
+
+
+def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_speed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("vibroimpact.orchestrator.orbits.first_orbits.SEEDS", 4)
+    scene = vi.Scene.from_file(CHAIN).with_values({PARAMETER: 0.47})
+    one = curves_of_grazes_between_impacts(scene.with_values({POSITION: 0.4}), 1)
+    two = curves_of_grazes_between_impacts(scene, 2)
+    corners = [point.values for locus in one.loci for kind, point in locus.special if kind == "another"]
+    (slow,) = [point.values for locus in two.loci for kind, point in locus.special if kind == "graze"]
+    assert min(np.abs(np.subtract(each, slow)).max() for each in corners) < 1e-10
+    assert slow == pytest.approx((0.47955763624, 0.31956742827), abs=1e-10)
+
+
+def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_of_these_grazes() -> None:
+    scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372, PARAMETER: 1.75})
+    branches = follow_branches(scene, PARAMETER, 1.6, 2.2, longest=0.05)
+    for branch in branches.branches:
+        branch.points = branch.points[-2:] if branch.name == "P(2,2)" else []
+    ranges = FollowSettings(1.6, 2.2, 0.01), FollowSettings(0.03, 0.05, 0.01)
+    loci = follow_loci(FollowedLoci(branches, POSITION), *ranges)
+    (met,) = [
+        point.values
+        for locus in loci.loci
+        for kind, point in locus.special
+        if kind == "graze between impacts"
+    ]
+    assert met == pytest.approx((1.7725763745, 0.037100299463), abs=1e-9)
+    alone = follow_branches(scene.with_values({POSITION: met[1]}), PARAMETER, 1.6, 2.2, longest=0.05)
+    last = [point for point in alone.branches[1].points if point.kind == "graze between impacts"]
+    assert last[0].at.value == pytest.approx(met[0], abs=1e-9)
+
+
+def test_the_file_says_where_its_branches_are(tmp_path: Path) -> None:
+    output = tmp_path / "loci.nc"
+    span = ["--parameter", PARAMETER, "--from", "0.84", "--to", "0.9", "--step", "0.1", "--doublings", "0"]
+    second = ["--second", POSITION, "--second-from", "0.1", "--second-to", "0.15"]
+    done = in_this_process("follow", CHAIN, *span, *second, "-o", output)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"{output} has the curves over both numbers; branches are written without --second." in done.stdout
+    with vi.open_dataset(output) as found:
+        assert found["position"].values.min() == pytest.approx(0.1, abs=1e-12)
