@@ -31,6 +31,56 @@ static void times_come_back(uint64_t *seed)
     }
 }
 
+static double apart(double one, double other)
+{
+    return fabs(remainder(one - other, 6.283185307179586));
+}
+
+static void another_frequency_keeps_time_phase_and_what_was(uint64_t *seed)
+{
+    int tuned = 0;
+    for (int n = 0; n < 20000; ++n) {
+        vi_clock clock;
+        double frequency = pow(10.0, uniform(seed, -6.0, 6.0));
+        CHECK(vi_clock_start(&clock, frequency, uniform(seed, -20.0, 20.0), 1.0), "frequency %g", frequency);
+        double time = uniform(seed, 0.0, 1.0) * pow(10.0, uniform(seed, -3.0, 6.0));
+        const double earlier = uniform(seed, 0.0, 1.0) * time;
+        vi_instant now, past, never = {0, 0.0, 0.0};
+        CHECK(vi_clock_instant(&clock, time, 0.0, &now) && vi_clock_instant(&clock, earlier, 0.0, &past), "%g", time);
+        bool counted = true;
+        for (int step = 0; step < 5; ++step) {
+            const double phase = vi_clock_phase(&clock, now), was = vi_clock_time(&clock, now);
+            const double other = choice(seed, 20) == 0 ? pow(10.0, uniform(seed, -310.0, 310.0))
+                                                       : pow(10.0, uniform(seed, -6.0, 6.0));
+            if (!vi_clock_can_retune(&clock, other, now)) {
+                continue;
+            }
+            const vi_instant before = now;
+            vi_instant *const seen[] = {&past, &never};
+            vi_clock_retune(&clock, other, &now, seen, 2);
+            ++tuned;
+            CHECK(now.periods == before.periods, "periods %lld", (long long)now.periods);
+            CHECK(now.rest >= 0.0 && now.rest < clock.period, "rest %g of %g", now.rest, clock.period);
+            CHECK(fabs(vi_clock_time(&clock, now) - was) <= 2.0 * DBL_EPSILON * was, "time %.17g of %.17g", was, other);
+            CHECK(apart(vi_clock_phase(&clock, now), phase) <= 1e-14, "phase %.17g at %.17g", phase, other);
+            const double ago = vi_clock_time(&clock, past);
+            counted = counted && was / clock.period < 1e15; /* else it is as long ago as can be counted */
+            CHECK(!counted || fabs(ago - earlier) <= 64.0 * DBL_EPSILON * time, "%.17g was %.17g", earlier, ago);
+            if (other < 1e6 && other > 1e-6) {
+                const double later = was + uniform(seed, 0.0, 3.0) * clock.period;
+                vi_instant end;
+                CHECK(vi_clock_instant(&clock, later, 0.0, &end), "time %g", later);
+                const double expected = phase + other * (later - was);
+                const double rounding = 16.0 * DBL_EPSILON * (other * later + 20.0);
+                CHECK(apart(vi_clock_phase(&clock, end), expected) <= rounding, "phase at %.17g, frequency %g", later, other);
+                now = end;
+                time = later;
+            }
+        }
+    }
+    CHECK(tuned > 50000, "%d", tuned);
+}
+
 static void a_short_time_in_a_long_period_keeps_its_digits(void)
 {
     vi_clock clock;
@@ -80,6 +130,7 @@ int main(void)
 {
     uint64_t seed = 2;
     times_come_back(&seed);
+    another_frequency_keeps_time_phase_and_what_was(&seed);
     a_short_time_in_a_long_period_keeps_its_digits();
     a_million_periods_keep_the_phase();
     what_cannot_be_counted_is_refused();

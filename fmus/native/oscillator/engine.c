@@ -92,7 +92,7 @@ void oscillator_start(oscillator *o, vi_instant now)
 void oscillator_drive(oscillator *o)
 {
     const bool possible = isfinite(o->forcing_amplitude)
-                          && vi_clock_can_retune(&o->body.clock, o->forcing_angular_frequency);
+                          && vi_clock_can_retune(&o->body.clock, o->forcing_angular_frequency, oscillator_now(o));
     if (!o->forcing_changed || !possible) {
         return;
     }

@@ -239,7 +239,7 @@ static void check_drive(char *message, const oscillator *o)
 {
     if (o->forcing_changed) {
         vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
-        vi_check_retuning(message, &o->body.clock, o->forcing_angular_frequency);
+        vi_check_retuning(message, &o->body.clock, o->forcing_angular_frequency, oscillator_now(o));
     }
 }
 

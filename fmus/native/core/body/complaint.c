@@ -58,11 +58,12 @@ void vi_check_finite(char message[VI_MESSAGE_LENGTH], const char *name, double v
     }
 }
 
-void vi_check_retuning(char message[VI_MESSAGE_LENGTH], const vi_clock *clock, double angular_frequency)
+void vi_check_retuning(char message[VI_MESSAGE_LENGTH], const vi_clock *clock, double angular_frequency,
+                       vi_instant now)
 {
-    if (!vi_clock_can_retune(clock, angular_frequency)) {
+    if (!vi_clock_can_retune(clock, angular_frequency, now)) {
         vi_complain(message, "forcing.angular_frequency: expected %s, got %.17g",
-                    clock->angular_frequency > 0.0 ? "another > 0, with a period between 1e-300 and 1e300 s"
+                    clock->angular_frequency > 0.0 ? "another > 0, with a period that the time can be counted in"
                                                    : "0, for the force is constant since the start",
                     angular_frequency);
     }

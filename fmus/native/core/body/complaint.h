@@ -14,8 +14,9 @@ void vi_check_positive(char message[VI_MESSAGE_LENGTH], const char *name, double
 void vi_check_not_negative(char message[VI_MESSAGE_LENGTH], const char *name, double value);
 void vi_check_finite(char message[VI_MESSAGE_LENGTH], const char *name, double value);
 
-/* Complain unless a forcing that this clock counts can go on at this angular frequency, rad/s. */
-void vi_check_retuning(char message[VI_MESSAGE_LENGTH], const vi_clock *clock, double angular_frequency);
+/* Complain unless a forcing that this clock counts can go on at this angular frequency, rad/s, from `now`. */
+void vi_check_retuning(char message[VI_MESSAGE_LENGTH], const vi_clock *clock, double angular_frequency,
+                       vi_instant now);
 
 typedef void (*vi_check)(char message[VI_MESSAGE_LENGTH], const char *name, double value);
 

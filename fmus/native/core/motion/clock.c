@@ -168,11 +168,19 @@ double vi_clock_phase(const vi_clock *clock, vi_instant instant)
 
 /* ---- another frequency ---- */
 
-bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency)
+bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_instant now)
 {
+    if (clock->angular_frequency == 0.0) {
+        return angular_frequency == 0.0;
+    }
     const double period = TWO_PI / angular_frequency;
-    return clock->angular_frequency == 0.0 ? angular_frequency == 0.0
-                                           : angular_frequency > 0.0 && period >= DBL_MIN && period <= DBL_MAX;
+    const double since = vi_clock_elapsed(clock, (vi_instant){0, 0.0, 0.0}, now);
+    /* the time is kept beside periods that are counted on: to twice the digits of their sum */
+    const double counted = (fabs((double)now.periods) + 1.0) * period;
+    const double time = fabs(vi_clock_time(clock, now));
+    const bool keeps_time = time == 0.0 || counted * (8.0 * DBL_EPSILON) <= time;
+    return angular_frequency > 0.0 && period >= DBL_MIN && counted <= DBL_MAX && fabs(since) / period < MOST_PERIODS
+           && keeps_time;
 }
 
 /* The instant of the same phase, in periods of another clock. */
@@ -190,12 +198,15 @@ static vi_instant at_phase_of(const vi_clock *clock, double angular_frequency, v
     return instant;
 }
 
-/* `now` moved back by `seconds` >= 0. */
+/* `now` moved back by `seconds` >= 0, as far as its periods can be counted. */
 static vi_instant before(const vi_clock *clock, vi_instant now, double seconds)
 {
-    const double count = ceil(seconds / clock->period);
-    now.periods -= (int64_t)count;
-    return vi_clock_after(clock, now, fma(count, clock->period, -seconds) + count * clock->period_low);
+    seconds = fmin(seconds, 0.5 * MOST_PERIODS * clock->period);
+    const double count = ceil(seconds / clock->period), whole = count * clock->period;
+    const double left = whole - seconds, rest = now.rest + left;
+    const double low = fma(count, clock->period, -whole) + count * clock->period_low + sum_error(whole, -seconds, left)
+                       + sum_error(now.rest, left, rest) + now.rest_low;
+    return normalized(clock, instant_of(now.periods - (int64_t)count, rest, low));
 }
 
 void vi_clock_retune(vi_clock *clock, double angular_frequency, vi_instant *now, vi_instant *const past[], int count)

@@ -39,8 +39,8 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now);
  * when angular_frequency is 0. Returns false when the period is not a finite positive number of seconds. */
 bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural);
 
-/* Can it go on at this angular frequency, rad/s? A force that has a phase keeps one; a constant one has none. */
-bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency);
+/* Can it go on at this angular frequency, rad/s, from `now`? A force that has a phase keeps one; a constant one has none. */
+bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_instant now);
 
 /* Go on at another angular frequency, at which it can, from *now on: time, forcing phase and count of periods stay.
  * past[]: instants before *now, which stay the same times. */

@@ -159,7 +159,7 @@ def test_an_answer_to_a_contact_and_a_tuned_force_come_at_one_event() -> None:
         )
 
 
-MOVING = "forcing.angular_frequency: expected another > 0, with a period between 1e-300 and 1e300 s, got "
+MOVING = "forcing.angular_frequency: expected another > 0, with a period that the time can be counted in, got "
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -171,6 +171,7 @@ MOVING = "forcing.angular_frequency: expected another > 0, with a period between
         (1.0, "forcing.angular_frequency", -1.0, MOVING + "-1"),
         (1.0, "forcing.angular_frequency", math.nan, MOVING + "nan"),
         (1.0, "forcing.angular_frequency", 1e-310, MOVING + "9.99"),
+        (1.0, "forcing.angular_frequency", 1e300, MOVING + "1.0"),
         (1.0, "forcing.amplitude", math.inf, "forcing.amplitude{}: expected a finite number, got inf"),
         (
             0.0,

@@ -246,7 +246,7 @@ void vi_structure_component_take_impulses(vi_structure_component *c)
 
 void vi_structure_component_drive(vi_structure_component *c, const double force[VI_MODES])
 {
-    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency);
+    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
     for (int j = 0; j < c->model.modes; ++j) {
         good = good && isfinite(force[j]);
     }
@@ -260,7 +260,7 @@ void vi_structure_component_drive(vi_structure_component *c, const double force[
 void vi_structure_component_check_drive(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
 {
     if (c->forcing_changed) {
-        vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency);
+        vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency, c->state.now);
     }
 }
 
