@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.assembling import assembled, wrapped
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import IMPACT_COLUMNS, NEEDED_IMPACT_COLUMNS, RAGGED, flat_order
 from vibroimpact.fmus.errors import DatasetError
@@ -98,7 +99,7 @@ def _with_columns(first: xr.Dataset, columns: dict[str, NDArray[Any]]) -> xr.Dat
         for name, variable in first.variables.items()
     }
     coords = {str(name): data.pop(str(name)) for name in first.coords}
-    return xr.Dataset(data, coords=coords, attrs=first.attrs)
+    return assembled(data, coords, first.attrs)
 
 
 def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
@@ -111,7 +112,7 @@ def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
             for name, variable in known.items()
             if name not in part.variables and variable.dims[0] in part.sizes
         }
-        completed.append(part.assign(missing) if missing else part)
+        completed.append(part.assign(wrapped(missing)) if missing else part)
     return completed
 
 

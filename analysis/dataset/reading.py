@@ -19,6 +19,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
+from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
@@ -108,7 +109,7 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
         linked = dict.fromkeys(links.split())
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         coords = {name: data.pop(name) for name in linked}
-        return _fitting(path, xr.Dataset(data, coords=coords, attrs=attrs))
+        return _fitting(path, assembled(data, coords, attrs))
 
 
 def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
+from vibroimpact.analysis.dataset.assembling import assembled, wrapped
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.columns import (
     OF_ALL_PERIODS,
@@ -160,7 +161,7 @@ def build_dataset(
     named: tuple[str, ...] = ("run_index", "direction")
     named += (("connection",) if connections else ()) + (("compared",) if compared else ())
     coords = {name: variables.pop(name) for name in named} | swept
-    return xr.Dataset(variables, coords=coords, attrs=described | dict(attrs or {}))
+    return assembled(variables, coords, described | dict(attrs or {}))
 
 
 def with_constants(
@@ -186,10 +187,16 @@ def with_constants(
     """
     units = dataset.attrs["units_system"]
     return dataset.assign_coords(
-        {
-            name: ((), np.float64(value), _quantity_attributes(name, units, unit_of or {}) | NOT_SWEPT)
-            for name, value in constants.items()
-        }
+        wrapped(
+            {
+                name: (
+                    (),
+                    np.array(value, dtype=float),
+                    _quantity_attributes(name, units, unit_of or {}) | NOT_SWEPT,
+                )
+                for name, value in constants.items()
+            }
+        )
     )
 
 

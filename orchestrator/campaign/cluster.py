@@ -26,6 +26,7 @@ from vibroimpact.fmus.python_child import safe_module_path
 from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
+from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.campaign.progress import Progress
 
 CONNECT_SECONDS = 5.0
@@ -110,13 +111,6 @@ def refuse_two_kinds_of_workers(workers: int | None, scheduler: object) -> None:
             f"{option('workers')} and {option('scheduler')}: expected one of them, got both. "
             "A scheduler has its own workers."
         )
-
-
-def processor_count() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _reached_by(scheduler: str | Client) -> tuple[str, Security | None]:

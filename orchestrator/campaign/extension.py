@@ -28,6 +28,7 @@ from vibroimpact.analysis.dataset import (
     take_runs,
     write_dataset,
 )
+from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State, empty_part
 from vibroimpact.orchestrator.campaign.manifest import (
@@ -243,7 +244,7 @@ def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) ->
     if "loop_residual" in rows.variables:
         variables["loop_residual"] = rows.variables["loop_residual"]
     coords = {str(name): variables.pop(str(name)) for name in like.coords}
-    return without_empty_periods(xr.Dataset(variables, coords=coords, attrs=like.attrs))
+    return without_empty_periods(assembled(variables, coords, like.attrs))
 
 
 def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:

@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.campaign.check import (
     MOST_TRIAL_SECONDS,
     Trial,
 )
-from vibroimpact.orchestrator.campaign.cluster import processor_count
+from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED, counted
 from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size

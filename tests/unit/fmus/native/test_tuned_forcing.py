@@ -159,7 +159,9 @@ def test_an_answer_to_a_contact_and_a_tuned_force_come_at_one_event() -> None:
         )
 
 
-MOVING = "forcing.angular_frequency: expected another > 0, with a period that the time can be counted in, got "
+MOVING = (
+    "forcing.angular_frequency: expected another > 0, with a period that the time can be counted in, got "
+)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
