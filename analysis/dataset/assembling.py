@@ -27,10 +27,11 @@ def wrapped(variables: Mapping[str, Described | xr.Variable]) -> dict[str, xr.Va
     Without its fast path xarray asks of each array whether it is one of Dask, and imports that to know.
     """
     return {
-        name: parts if isinstance(parts, xr.Variable) else _variable(*parts)
+        name: parts if isinstance(parts, xr.Variable) else new_variable(*parts)
         for name, parts in variables.items()
     }
 
 
-def _variable(dims: tuple[Hashable, ...], values: Any, attrs: Mapping[Any, Any]) -> xr.Variable:
+def new_variable(dims: str | tuple[Hashable, ...], values: Any, attrs: Mapping[Any, Any]) -> xr.Variable:
+    """Return one variable of xarray."""
     return xr.Variable(dims, values, attrs, fastpath=type(values) is np.ndarray)

@@ -19,7 +19,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
-from vibroimpact.analysis.dataset.assembling import assembled
+from vibroimpact.analysis.dataset.assembling import assembled, new_variable
 from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
@@ -296,7 +296,7 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
         if name in (*swept, *constants, "direction"):
             continue
         variables[str(name)] = _placed(variable, dims, run_id) if variable.dims[:1] == ("run",) else variable
-    variables["run_id"] = xr.Variable(
+    variables["run_id"] = new_variable(
         dims, run_id, {"long_name": "position of the run in the file", "units": "1"}
     )
     variables |= _row_owners(flat)
@@ -307,7 +307,7 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
     coordinates |= {name: flat.variables[name] for name in constants}
     if dims == ("run",):
         coordinates |= {name: flat.variables[name] for name in swept}
-        coordinates["direction"] = xr.Variable(
+        coordinates["direction"] = new_variable(
             "run", _direction_names(flat), _plain(flat.variables["direction"])
         )
         axes = {}
@@ -343,7 +343,7 @@ def _row_owners(flat: xr.Dataset) -> dict[str, xr.Variable]:
     """Return, for each row of each ragged array, the run_id of the run it belongs to."""
     runs = np.arange(flat.sizes["run"], dtype=np.int32)
     return {
-        f"{dimension}_run": xr.Variable(
+        f"{dimension}_run": new_variable(
             dimension,
             np.repeat(runs, flat.variables[count].values),
             {"long_name": f"run_id of the run of each {dimension}", "units": "1"},
@@ -366,15 +366,15 @@ def _grid(
     if directions.size and (directions != Direction.independent).any():
         present, place = _distinct(directions)
         labels = np.array([Direction(int(value)).name for value in present])
-        axes["direction"] = xr.Variable("direction", labels, _plain(flat.variables["direction"]))
+        axes["direction"] = new_variable("direction", labels, _plain(flat.variables["direction"]))
         sizes["direction"] = labels.size
         places.append(place)
     elif directions.size:
-        scalars["direction"] = xr.Variable((), names[0], _plain(flat.variables["direction"]))
+        scalars["direction"] = new_variable((), np.asarray(names[0]), _plain(flat.variables["direction"]))
     for dimension, names_along in _swept_along(flat).items():
         values, place = _distinct_points([flat.variables[name] for name in names_along])
         for name, column in zip(names_along, values.T, strict=True):
-            axes[name] = xr.Variable(dimension, column, flat.variables[name].attrs)
+            axes[name] = new_variable(dimension, column, flat.variables[name].attrs)
         sizes[dimension] = len(values)
         places.append(place)
     run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])

@@ -62,7 +62,7 @@ def _where(dataset: xr.Dataset, place: NDArray[np.intp]) -> str:
 
 def _warning_lines(dataset: xr.Dataset) -> Iterator[str]:
     """Yield the messages of runs that went well: such runs have one only where their body warned."""
-    fine = dataset.outcome.isin([Outcome.ok, Outcome.stuck]).values
+    fine = np.isin(dataset.outcome.values, [Outcome.ok, Outcome.stuck])
     messages = sorted({str(text) for text in dataset.message.values[fine] if text})
     for message in messages[:MOST_WARNINGS]:
         yield f"warning: {message}"
