@@ -419,7 +419,7 @@ def follow(
     -------
     xarray.Dataset
         Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
-        `second`, each is an orbit at a bifurcation.
+        `second`, each is an orbit at a bifurcation, where there are any.
 
     Raises
     ------
@@ -450,7 +450,8 @@ def follow(
     result: Followed | FollowedLoci = followed
     if second is not None and second_range is not None:
         ranges = [FollowSettings(min(ends), max(ends), step) for ends in ((start, stop), second_range)]
-        result = follow_loci(FollowedLoci(followed, second), *ranges)
+        loci = follow_loci(FollowedLoci(followed, second), *ranges)
+        result = loci if loci.loci else followed
     with _ONE_AT_A_TIME, ScratchFolder("orbits") as folder:
         target = Path(folder.name, "branches.nc") if path is None else _path(path)
         write_dataset(result.dataset, target)

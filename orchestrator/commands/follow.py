@@ -121,6 +121,7 @@ def _follow(
         doublings=wanted.doublings,
         longest=wanted.step,
         told=told,
+        looking=lambda value: show(f"Looking for orbits, {wanted.parameter} {value:.6g}"),
         followed=followed,
     )
     low, high = wanted.second_span

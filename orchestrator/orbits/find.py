@@ -16,6 +16,8 @@ LONGEST = 16
 """Forcing periods of an orbit that a run is taken to end on."""
 TRANSIENT = 2000
 """Forcing periods that a run is given to come to its orbit."""
+LARGEST_PHASE = 1e6
+"""Of a seed, rad: a larger one has lost digits of the turn that it is in."""
 REPEATS = 1e-4
 """Difference of phases, rad, up to which a run has come near to an orbit; Newton's method does the rest."""
 
@@ -68,7 +70,9 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
         raise UsageError(
             f"orbit: seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}."
         )
-    for _, stop in seed:
+    for phase, stop in seed:
+        if abs(phase) > LARGEST_PHASE:
+            raise UsageError(f"orbit: seed: expected phases up to {LARGEST_PHASE:g} rad, got {phase:g}.")
         if not 1 <= stop <= len(body.contacts):
             raise UsageError(f"orbit: seed: expected stops 1 to {len(body.contacts)}, got {stop}.")
     phases, contacts = [phase for phase, _ in seed], [stop - 1 for _, stop in seed]

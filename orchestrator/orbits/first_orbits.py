@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -26,6 +26,7 @@ def first_orbits(
     impacts: int | None,
     periods: int,
     seed: Seed | None,
+    looking: Callable[[float], None] = lambda value: None,
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Return values of the parameter and a physical orbit at each; several may lie on one branch.
 
@@ -43,6 +44,8 @@ def first_orbits(
         p and q; one impact, or as many as the seed has.
     seed : sequence of (phase, stop), optional
         Impacts near to those of the only orbit.
+    looking : callable
+        Hears of each value at which many starts are tried.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def first_orbits(
     elif impacts in (None, 1):
         yield from _of_one_impact(body_at, settings, periods)
     else:
-        yield from _of_many_impacts(body_at, scene, parameter, settings, impacts, periods)
+        yield from _of_many_impacts(body_at, scene, parameter, settings, impacts, periods, looking)
 
 
 def _values(settings: FollowSettings) -> list[float]:
@@ -84,11 +87,13 @@ def _of_many_impacts(
     settings: FollowSettings,
     impacts: int,
     periods: int,
+    looking: Callable[[float], None],
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Return orbits at values of the range, first at the scene's own: a branch may lie between the others."""
     own = float(scene.value(parameter))
     inside = [own] if settings.lowest <= own <= settings.highest else []
     for value in [*inside, *_values(settings)]:
+        looking(value)
         yield from ((value, orbit) for orbit in orbits_of(body_at(value), impacts, periods))
 
 

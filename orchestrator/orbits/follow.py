@@ -190,6 +190,7 @@ def follow_branches(
     doublings: int = 1,
     longest: float = 0.01,
     told: Told = lambda branch, orbit: None,
+    looking: Callable[[float], None] = lambda value: None,
     followed: Followed | None = None,
 ) -> Followed:
     """Follow orbits P(p,q), and those that leave them at period doublings.
@@ -213,6 +214,8 @@ def follow_branches(
         Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
     told : callable
         Hears of each orbit.
+    looking : callable
+        Hears of each value at which orbits of several impacts are looked for.
     followed : Followed, optional
         Where branches are put, for callers that keep them when they are interrupted.
 
@@ -227,7 +230,7 @@ def follow_branches(
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower, result = Follower(body_at, settings), followed or Followed(scene, parameter)
-    begun = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed)
+    begun = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
     for value, orbit in begun:
         if not _is_known(result.branches, orbit, value, settings):
             _both_ways(follower, orbit, value, result, told)

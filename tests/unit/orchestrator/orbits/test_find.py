@@ -11,6 +11,7 @@ from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import OrbitError
+from vibroimpact.fmus.errors import DatasetError
 
 SCENE = ROOT / "examples" / "bifurcation.toml"
 
@@ -31,6 +32,7 @@ SCENE = ROOT / "examples" / "bifurcation.toml"
         (["--seed", "2.6:3"], "orbit: seed: expected stops 1 to 1, got 3."),
         (["--seed", "2.6:0"], "orbit: seed: expected stops 1 to 1, got 0."),
         (["--seed", "0.9,7.2", "--impacts", "3"], "orbit: seed: expected 3 impacts"),
+        (["--seed", "1e308"], "orbit: seed: expected phases up to 1e+06 rad, got 1e+308."),
         (["--seed", "3,2"], "phases: expected ascending ones within 1 turns"),
         (["-o", "orbits.png"], "orbits.png"),
     ],
@@ -95,3 +97,38 @@ def test_the_orbit_near_to_a_seed_is_found_and_counted_once() -> None:
     assert stable.multipliers[0] == pytest.approx(vi.find_orbits(at, 1)[0].multipliers[0], abs=1e-9)
     with pytest.raises(OrbitError, match=r"expected an orbit P\(1,2\) near to the phases \[2.6\], got none"):
         vi.find_orbits(at, periods=2, seed=[(2.6, 1)])
+
+
+def test_the_orbit_of_a_run_is_found_from_its_impacts(tmp_path: Path) -> None:
+    file = tmp_path / "runs.nc"
+    swept = vi.Scene.from_file(ROOT / "examples" / "two_stops.toml").with_sweep(
+        {"forcing.angular_frequency": {"values": [0.9, 1.0]}}
+    )
+    vi.run(swept, file)
+    done = in_this_process(
+        "orbit", ROOT / "examples" / "two_stops.toml", "--from-dataset", file, "--run", "1"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "1 physical orbit." in done.stdout
+    near = vi.seed_of_run(file, 1)
+    assert [stop for _, stop in near.impacts] == [1, 2]
+    (orbit,) = vi.find_orbits(
+        swept.with_sweep({}).with_values(near.values), seed=near.impacts, periods=near.periods
+    )
+    np.testing.assert_allclose(orbit.phases, [phase for phase, _ in near.impacts], rtol=0.0, atol=1e-12)
+    done = in_this_process("orbit", SCENE, "--from-dataset", file, "--run", "1")
+    assert (done.returncode, done.stderr) == (2, "orbit: seed: expected stops 1 to 1, got 2.\n")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"record.transient_periods": 0, "record.recorded_periods": 2}, "got none: not periodic"),
+        ({"forcing.amplitude": 0.0}, "got none: no impacts."),
+        ({"record.impacts": False}, "seed: expected recorded impacts, got no impact_time"),
+    ],
+)
+def test_a_run_without_an_orbit_gives_no_seed(changes: dict[str, object], said: str) -> None:
+    at = vi.Scene.from_file(SCENE).with_sweep({}).with_values({"forcing.angular_frequency": 1.2})
+    with pytest.raises(DatasetError, match=said):
+        vi.seed_of_run(vi.run(at.with_values(changes)))

@@ -84,3 +84,10 @@ def test_the_file_says_where_its_branches_are(tmp_path: Path) -> None:
     assert f"{output} has the curves over both numbers; branches are written without --second." in done.stdout
     with vi.open_dataset(output) as found:
         assert found["position"].values.min() == pytest.approx(0.1, abs=1e-12)
+
+
+def test_without_a_bifurcation_branches_are_what_there_is() -> None:
+    found = vi.follow(
+        CHAIN, PARAMETER, 0.9, 1.0, doublings=0, step=0.1, second=POSITION, second_range=(0.1, 0.15)
+    )
+    assert set(found["orbit_special"].values) == {SpecialOrbit.none}
