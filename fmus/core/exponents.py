@@ -63,9 +63,8 @@ class Stretching:
             The impacts are none of the body.
         """
         stretch = np.zeros(2 * self._body.modes)
-        end = OrbitEnd(
-            _function()(self._body.address, self._run, first, last, self._state, self._directions, stretch)
-        )
+        arrays = (each.ctypes.data for each in (self._state, self._directions, stretch))
+        end = OrbitEnd(_function()(self._body.address, self._run, first, last, *arrays))
         if end is not OrbitEnd.done:
             raise UsageError(
                 f"lyapunov: expected impacts of a body that answers its force, got {end.name} ones."
@@ -76,6 +75,5 @@ class Stretching:
 @cache
 def _function() -> Any:
     function = core_library().vi_door_exponents
-    numbers = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
-    function.argtypes = [POINTER(BODY), POINTER(_Run), c_int64, c_int64, *[numbers] * 3]
+    function.argtypes = [POINTER(BODY), POINTER(_Run), c_int64, c_int64, *[c_void_p] * 3]
     return function

@@ -83,7 +83,8 @@ class OrbitBody:
         train = _train(contacts, phases, periods)
         velocities, distances = np.empty(n), np.empty(n)
         slopes, faster = np.empty((n, n)), np.empty((n, n))
-        end = _library().vi_door_orbit(self.address, train, velocities, distances, slopes, faster)
+        filled = (velocities, distances, slopes, faster)
+        end = _library().vi_door_orbit(self.address, train, *(each.ctypes.data for each in filled))
         return Evaluation(OrbitEnd(end), velocities, distances, slopes, faster)
 
     def motion(
@@ -92,7 +93,9 @@ class OrbitBody:
         """Return the states after the impacts, shape (impacts, 2 modes), and the monodromy matrix of the first: 4.2."""
         train = _train(contacts, phases, periods)
         states, monodromy = np.empty((phases.size, 2 * self.modes)), np.empty((2 * self.modes,) * 2)
-        _check(_library().vi_door_orbit_motion(self.address, train, velocities, states, monodromy))
+        speeds = _numbers(velocities, phases.shape)
+        arrays = (speeds, states, monodromy)
+        _check(_library().vi_door_orbit_motion(self.address, train, *(each.ctypes.data for each in arrays)))
         return states, monodromy
 
     def maximum(
@@ -100,8 +103,8 @@ class OrbitBody:
     ) -> tuple[float, float, int]:
         """Return how far the highest maximum between impacts is beyond its stop (m), its phase, its contact or -1."""
         train = _train(contacts, phases, periods)
-        what = np.empty(3)
-        _check(_library().vi_door_orbit_maximum(self.address, train, states, what))
+        what, known = np.empty(3), _numbers(states, (phases.size, 2 * self.modes))
+        _check(_library().vi_door_orbit_maximum(self.address, train, known.ctypes.data, what.ctypes.data))
         return float(what[0]), float(what[1]), int(what[2])
 
 
@@ -138,6 +141,14 @@ def _train(contacts: NDArray[np.int32], phases: Array, periods: int) -> _Train:
     return train
 
 
+def _numbers(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return an array as C reads it."""
+    found = np.ascontiguousarray(array, dtype=np.float64)
+    if found.shape != shape:
+        raise UsageError(f"orbit: expected numbers of shape {shape}, got {found.shape}.")
+    return found
+
+
 def _check(end: int) -> None:
     if end != OrbitEnd.done:
         raise UsageError(f"orbit: expected a body and impacts that have an orbit, got {OrbitEnd(end).name}.")
@@ -146,9 +157,9 @@ def _check(end: int) -> None:
 @cache
 def _library() -> ctypes.CDLL:
     library = core_library()
-    numbers = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
     body, train = POINTER(BODY), POINTER(_Train)
-    library.vi_door_orbit.argtypes = [body, train, *[numbers] * 4]
-    library.vi_door_orbit_motion.argtypes = [body, train, *[numbers] * 3]
-    library.vi_door_orbit_maximum.argtypes = [body, train, *[numbers] * 2]
+    # addresses: what converts arrays is Python code, in which Ctrl-C would become an error of an argument
+    library.vi_door_orbit.argtypes = [body, train, *[c_void_p] * 4]
+    library.vi_door_orbit_motion.argtypes = [body, train, *[c_void_p] * 3]
+    library.vi_door_orbit_maximum.argtypes = [body, train, *[c_void_p] * 2]
     return library
