@@ -14,8 +14,10 @@ endif
 BIN := $(VENV)/bin
 NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' -o -name '*.md') \
 	$(wildcard fmus/packaging/description/*.py) fmus/packaging/build.py fmus/packaging/compiler.py
-# tests side by side, four at most, as many start processes of their own; `make test PARALLEL=` runs them one by one
-PARALLEL ?= -n auto --maxprocesses 4 --dist worksteal
+# tests side by side: one more than there are cores, as many wait for processes of their own, and four at most for they
+# use cores as well; `make test PARALLEL=` runs them one by one
+WORKERS = $(shell $(PYTHON) -c 'import os; print(min(4, (os.cpu_count() or 1) + 1))')
+PARALLEL ?= -n $(WORKERS) --dist worksteal
 SETUP := pyproject.toml hatch_build.py
 # pip says what it does: it takes minutes, and silence looks like a stall
 INSTALL = $(BIN)/python -m pip install --disable-pip-version-check
