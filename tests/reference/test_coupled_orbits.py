@@ -113,6 +113,7 @@ def assert_same_motion(one: RunRecord, other: RunRecord, tolerance: float = SEQU
 
 
 SHORT_FORM: dict[str, list[dict[str, float]]] = {
+    "basins.toml": [{}],
     "bifurcation.toml": [{"forcing.angular_frequency": w} for w in (0.85, 0.95, 1.1, 1.3)],
     "chatter.toml": [{}],
     "coupled_p11.toml": [{}],
