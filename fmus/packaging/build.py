@@ -207,8 +207,11 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     What a component has no use for is no part of its saved states.
     """
     blocks = component.repeats
-    largest = {"VI_MODES": blocks.get("mode", blocks.get("mass", 0)), "VI_PORTS": blocks.get("contact", 0)}
-    return {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
+    modes = blocks.get("mode", blocks.get("mass"))
+    largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
+    arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
+    # loops over the modes of a body that has no more than one cost nothing
+    return arrays if modes is not None else {**arrays, "VI_ONLY_MODES": 1}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:

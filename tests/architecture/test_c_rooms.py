@@ -13,7 +13,7 @@ FLOORS = (
     ("motion",),
     ("contact", "measuring", "modes"),
     ("body",),
-    ("body/one_mass", "body/modal"),
+    ("body/modal",),
     ("door",),
 )
 

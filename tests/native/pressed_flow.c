@@ -25,7 +25,7 @@ static double held[VI_MODES];
 
 static vi_structure body_of(parts *it, vi_pressed *kept)
 {
-    return (vi_structure){&it->model, &it->state, it->contacts, &it->record, kept};
+    return (vi_structure){&it->model, &it->state, it->contacts, &it->record, kept, NULL};
 }
 
 /* How the modes are damped. */

@@ -21,6 +21,9 @@ SANITIZERS = ("address", "undefined")
 PROBE = "int main(int count, char **names) { (void)names; return count - 1; }\n"
 #: Longest that one test may take under the sanitizers, s.
 LIMIT = 600.0
+#: Tests of bodies of one mode, which run on a core that is compiled for them, as the Oscillator's is.
+OF_ONE_MODE = ("one_mode.c",)
+ONE_MODE = ("-DVI_MODES=2", "-DVI_PORTS=2", "-DVI_ONLY_MODES=1")
 ENVIRONMENT = {**os.environ, "UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=1"}
 
 
@@ -43,9 +46,10 @@ def options_for(sanitizers: Sequence[str]) -> list[str]:
 
 
 def compile_core(compiler: Sequence[str], options: Sequence[str], folder: Path) -> list[Path] | None:
-    """Compile the core, which all tests share, side by side on all processors; None if that fails."""
+    """Compile the core, which tests share, side by side on all processors; None if that fails."""
+    folder.mkdir()
     sources = sorted((NATIVE / "core").rglob("*.c"))
-    objects = [folder / f"{source.stem}.core.o" for source in sources]
+    objects = [folder / f"{source.stem}.o" for source in sources]
 
     def compiles(source: Path, target: Path) -> bool:
         return subprocess.run([*compiler, *options, "-c", str(source), "-o", str(target)]).returncode == 0
@@ -75,12 +79,18 @@ def main() -> int:
         for missing in sorted(set(SANITIZERS) - set(sanitizers)):
             print(f"SKIPPED: the {missing} sanitizer, which {' '.join(compiler)} does not have here")
         options = options_for(sanitizers)
-        core = compile_core(compiler, options, folder)
+        cores = {
+            only_one: (sizes, compile_core(compiler, [*options, *sizes], folder / f"core{len(sizes)}"))
+            for only_one, sizes in ((False, ()), (True, ONE_MODE))
+        }
+
+        def passes(test: Path) -> bool:
+            sizes, core = cores[test.name in OF_ONE_MODE]
+            return core is not None and run(test, compiler, [*options, *sizes], core, folder)
+
         tests = sorted(HERE.glob("*.c"))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            results = pool.map(
-                lambda test: core is not None and run(test, compiler, options, core, folder), tests
-            )
+            results = pool.map(passes, tests)
             for test, passed in zip(tests, results, strict=True):
                 kinds, result = ", ".join(sanitizers) or "no sanitizer", "passed" if passed else "FAILED"
                 print(f"{test.name} ({kinds}): {result}")

@@ -1,5 +1,6 @@
 /* Random bodies of up to 64 modes with up to eight stops of every law, extreme ones too: finite, never beyond a rigid
  * stop, never back in time, never for ever; stops only push. */
+#include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 
@@ -26,7 +27,8 @@ static vi_structure_state state;
 static vi_contact contacts[VI_PORTS];
 static vi_record record;
 static vi_pressed pressed;
-static const vi_structure body = {&model, &state, contacts, &record, &pressed};
+static vi_scan scan;
+static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan};
 
 static void make_modes(uint64_t *seed, double root)
 {

@@ -8,5 +8,8 @@
 #ifndef VI_PORTS
 #define VI_PORTS 8 /* contacts of a structure */
 #endif
+#ifndef VI_ONLY_MODES
+#define VI_ONLY_MODES 0 /* the one number of modes that its bodies have, which costs no loops then; 0: any up to VI_MODES */
+#endif
 
 #endif

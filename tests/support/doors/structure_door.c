@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 
@@ -13,12 +14,14 @@ struct vi_door_structure {
     vi_contact contacts[VI_PORTS];
     vi_record record;
     vi_pressed pressed;
+    vi_scan scan;
     int by_series; /* long rests too */
 };
 
 static vi_structure parts(vi_door_structure *d)
 {
-    return (vi_structure){&d->model, &d->state, d->contacts, &d->record, d->by_series ? NULL : &d->pressed};
+    return (vi_structure){&d->model, &d->state, d->contacts, &d->record, d->by_series ? NULL : &d->pressed,
+                          &d->scan};
 }
 
 static void set_stop(vi_contact *contact, const vi_door_stop *stop)

@@ -1,4 +1,4 @@
-/* Chatter, for all engines: which bounces are low, and what becomes of those still to come. equations.md 3.1 */
+/* Chatter, for all bodies: which bounces are low, and what becomes of those still to come. equations.md 3.1 */
 #ifndef VIBROIMPACT_CHATTER_H
 #define VIBROIMPACT_CHATTER_H
 

@@ -1,4 +1,4 @@
-/* What a contact port shows of its impacts, rests and releases, for all engines. */
+/* What a contact port shows of its impacts, rests and releases, for all bodies. */
 #ifndef VIBROIMPACT_CONTACT_EVENTS_H
 #define VIBROIMPACT_CONTACT_EVENTS_H
 

@@ -1,4 +1,4 @@
-/* How a flight ends, for all engines: where a segment ends, when a contact counts as met, and from which bounces on a
+/* How a flight ends, for all bodies: where a segment ends, when a contact counts as met, and from which bounces on a
  * body is followed from its stop. */
 #ifndef VIBROIMPACT_LANDING_H
 #define VIBROIMPACT_LANDING_H

@@ -33,18 +33,3 @@ bool vi_contact_law_known(int64_t law)
 {
     return law == VI_LAW_RESTITUTION || vi_contact_law_is_compliant(law);
 }
-
-bool vi_contact_law_has_stop(int64_t law)
-{
-    return law != VI_LAW_NONE && law != VI_LAW_PAIR;
-}
-
-bool vi_contact_law_is_compliant(int64_t law)
-{
-    return law == VI_LAW_KELVIN_VOIGT || law == VI_LAW_HERTZ || law == VI_LAW_HUNT_CROSSLEY;
-}
-
-double vi_contact_direction(int64_t side)
-{
-    return side == VI_SIDE_LOWER ? -1.0 : 1.0;
-}

@@ -46,12 +46,21 @@ vi_contact_force vi_contact_law_force(const vi_contact_law *law, double penetrat
 bool vi_contact_law_known(int64_t law);
 
 /* Is there a stop that the body looks for by itself? */
-bool vi_contact_law_has_stop(int64_t law);
+static inline bool vi_contact_law_has_stop(int64_t law)
+{
+    return law != VI_LAW_NONE && law != VI_LAW_PAIR;
+}
 
 /* Does the stop yield (a force law), instead of answering with an impulse? */
-bool vi_contact_law_is_compliant(int64_t law);
+static inline bool vi_contact_law_is_compliant(int64_t law)
+{
+    return law == VI_LAW_KELVIN_VOIGT || law == VI_LAW_HERTZ || law == VI_LAW_HUNT_CROSSLEY;
+}
 
 /* +1 for a stop above the motion, -1 for one below: displacements times this approach the stop as they grow. */
-double vi_contact_direction(int64_t side);
+static inline double vi_contact_direction(int64_t side)
+{
+    return side == VI_SIDE_LOWER ? -1.0 : 1.0;
+}
 
 #endif

@@ -1,71 +1,116 @@
 #include "door/door.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
-#include "body/one_mass/body.h"
+#include "body/modal/modal_scan.h"
+#include "body/modal/structure.h"
 
-static bool start(vi_body *body, const vi_door_oscillator *o, double phase, const double state[2])
+/* A body of one mode, mass-normalised, with at most one stop. */
+typedef struct {
+    vi_structure_model model;
+    vi_structure_state state;
+    vi_contact contact;
+    vi_record record;
+    double root;   /* sqrt(mass) */
+    vi_scan *scan; /* NULL: one flight is not worth it */
+} body;
+
+static vi_structure parts_of(body *b)
 {
-    memset(body, 0, sizeof *body);
+    return (vi_structure){&b->model, &b->state, &b->contact, &b->record, NULL, b->scan};
+}
+
+static bool start(body *b, const vi_door_oscillator *o, double phase, const double state[2], const vi_contact *contact)
+{
+    memset(b, 0, sizeof *b);
     if (!(o->mass > 0.0) || !(o->damping >= 0.0) || !(o->stiffness >= 0.0) || !(o->angular_frequency >= 0.0)
-        || !isfinite(o->mass + o->damping + o->stiffness + o->amplitude + phase + state[0] + state[1])) {
+        || !isfinite(o->mass + o->damping + o->stiffness + o->amplitude + phase + state[0] + state[1])
+        || !isfinite(contact->position)) {
         return false;
     }
-    body->mass = o->mass;
-    vi_mode_start(&body->mode, o->mass, o->damping, o->stiffness, o->amplitude, o->angular_frequency);
+    b->root = sqrt(o->mass);
+    b->contact = *contact;
+    b->model.modes = 1;
+    b->model.contacts = vi_contact_law_has_stop(contact->law.law);
+    vi_mode *mode = &b->model.mode[0];
+    vi_mode_start(mode, o->mass, o->damping, o->stiffness, 0.0, 0.0);
+    vi_mode_drive(mode, o->amplitude / b->root, o->angular_frequency);
+    b->model.shape[0][0] = b->model.impulse[0][0] = b->model.observed[0] = 1.0 / b->root;
+    vi_structure_prepare(&b->model);
+    b->state.q[0] = b->root * state[0];
+    b->state.p[0] = b->root * state[1];
     vi_instant now;
-    if (!vi_clock_start(&body->clock, o->angular_frequency, phase, body->mode.natural)
-        || !vi_clock_instant(&body->clock, 0.0, 0.0, &now)) {
+    if (!vi_clock_start(&b->model.clock, o->angular_frequency, phase, mode->natural)
+        || !vi_clock_instant(&b->model.clock, 0.0, 0.0, &now)) {
         return false;
     }
-    vi_body_start(body, now, state[0], state[1]);
+    const vi_structure s = parts_of(b);
+    vi_structure_start(&s, now);
     return true;
 }
 
-static bool advance(vi_body *body, double duration)
+static bool advance(body *b, double from, double to, bool stop_at_contacts)
 {
-    const vi_step_request request = {0.0, duration, true, false};
+    const vi_structure s = parts_of(b);
+    const vi_step_request request = {from, to - from, stop_at_contacts, false};
     vi_instant target;
-    return duration >= 0.0 && vi_clock_instant(&body->clock, duration, 0.0, &target)
-           && vi_body_advance(body, target, &request) < VI_STEP_ERROR;
+    return to >= from && vi_clock_instant(&b->model.clock, to, 0.0, &target)
+           && vi_structure_advance(&s, target, &request) < VI_STEP_ERROR;
+}
+
+static void motion_now(body *b, double *displacement, double *velocity)
+{
+    const vi_structure s = parts_of(b);
+    double acceleration[VI_MODES];
+    vi_structure_outputs(&s, acceleration);
+    *displacement = vi_structure_observed(&s);
+    *velocity = b->state.p[0] / b->root;
 }
 
 VI_DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const double state[2], double held,
                       double held_rate, double duration, double end[2])
 {
-    vi_body body;
-    if (!start(&body, oscillator, phase, state) || !isfinite(held + held_rate)) {
+    body b;
+    const vi_contact none = {.law = {.law = VI_LAW_NONE}, .side = VI_SIDE_UPPER};
+    if (!start(&b, oscillator, phase, state, &none) || !isfinite(held + held_rate)) {
         return 1;
     }
-    vi_body_hold(&body, held, held_rate);
-    if (!advance(&body, duration)) {
+    const double load[VI_MODES] = {b.root * held}, rate[VI_MODES] = {b.root * held_rate};
+    const vi_structure s = parts_of(&b);
+    vi_structure_hold(&s, load, rate);
+    if (!advance(&b, 0.0, duration, true)) {
         return 1;
     }
-    end[0] = body.displacement;
-    end[1] = body.velocity;
+    motion_now(&b, &end[0], &end[1]);
     return 0;
 }
 
 VI_DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double phase, const double state[2],
                               double position, int side, double duration, double contact[2])
 {
-    vi_body body;
-    if (!start(&body, oscillator, phase, state) || !isfinite(position)) {
+    body b;
+    /* an external law: stop there, resolve nothing */
+    const vi_contact stop = {.law = {.law = VI_LAW_EXTERNAL}, .side = side, .position = position};
+    if (!start(&b, oscillator, phase, state, &stop)) {
         return -1;
     }
-    body.contacts[0].law.law = VI_LAW_EXTERNAL; /* stop there, resolve nothing */
-    body.contacts[0].side = side;
-    body.contacts[0].position = position;
-    const vi_instant begin = body.now;
-    if (!advance(&body, duration)) {
+    const double approach = vi_contact_direction(side) * state[1];
+    if (state[0] == position && approach > 0.0) {
+        contact[0] = 0.0;
+        contact[1] = approach;
+        return 1;
+    }
+    const vi_instant begin = b.state.now;
+    if (!advance(&b, 0.0, duration, true)) {
         return -1;
     }
-    if (!body.pending) {
+    if (!b.state.pending) {
         return 0;
     }
-    contact[0] = vi_clock_elapsed(&body.clock, begin, body.now);
-    contact[1] = fabs(body.velocity);
+    contact[0] = vi_clock_elapsed(&b.model.clock, begin, b.state.now);
+    contact[1] = fabs(b.state.p[0]) / b.root;
     return 1;
 }
 
@@ -73,25 +118,23 @@ VI_DOOR int vi_door_motion(const vi_door_oscillator *oscillator, double phase, c
                            int side, double restitution, int count, const double instants[], double displacement[],
                            double velocity[])
 {
-    vi_body body;
-    if (!start(&body, oscillator, phase, state) || !isfinite(position) || !(restitution >= 0.0 && restitution <= 1.0)) {
+    body b;
+    const vi_contact stop = {.law = {.law = side == 0 ? VI_LAW_NONE : VI_LAW_RESTITUTION, .restitution = restitution},
+                             .side = side == 0 ? VI_SIDE_UPPER : side,
+                             .position = position};
+    if (!(restitution >= 0.0 && restitution <= 1.0) || !start(&b, oscillator, phase, state, &stop)) {
         return -1;
     }
-    body.contacts[0].law.law = side == 0 ? VI_LAW_NONE : VI_LAW_RESTITUTION;
-    body.contacts[0].law.restitution = restitution;
-    body.contacts[0].side = side == 0 ? 1 : side;
-    body.contacts[0].position = position;
+    vi_scan scan;
+    scan.modes = 0; /* nothing is made yet */
+    b.scan = &scan;
     double reached = 0.0;
     for (int i = 0; i < count; ++i) {
-        const vi_step_request request = {reached, instants[i] - reached, false, false};
-        vi_instant target;
-        if (!(instants[i] >= reached) || !vi_clock_instant(&body.clock, instants[i], 0.0, &target)
-            || vi_body_advance(&body, target, &request) >= VI_STEP_ERROR) {
+        if (!advance(&b, reached, instants[i], false)) {
             return -1;
         }
         reached = instants[i];
-        displacement[i] = body.displacement;
-        velocity[i] = body.velocity;
+        motion_now(&b, &displacement[i], &velocity[i]);
     }
-    return (int)body.contacts[0].count;
+    return (int)b.contact.count;
 }

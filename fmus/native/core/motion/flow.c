@@ -303,9 +303,15 @@ void vi_segment_part(const vi_segment *s, double u, vi_part *part)
         return;
     }
     const vi_mode *mode = s->mode;
-    const propagator p = propagate_segment(s, u);
-    part->x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
-    part->v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
+    propagator p = {.slow = 1.0, .fast = 1.0};
+    if (u == 0.0) {
+        part->x = s->start;
+        part->v = s->start_rate;
+    } else {
+        p = propagate_segment(s, u);
+        part->x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+        part->v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
+    }
     part->a = -2.0 * mode->decay * part->v - mode->stiffness * part->x;
     part->j = -2.0 * mode->decay * part->a - mode->stiffness * part->v;
     part->snap_bound = homogeneous_bound(s, p.slow, p.fast, part->x, part->v);
@@ -355,6 +361,7 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
         bound_series(segment);
     } else {
         segment->start = segment->x;
+        segment->start_rate = segment->v;
         bound_split(segment);
     }
 }

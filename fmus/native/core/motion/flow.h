@@ -64,7 +64,7 @@ typedef struct {
     double series_snap_bound;
     double x, v;          /* homogeneous state, when split, `since` before the start */
     double since, since_low; /* s, and its rounding */
-    double start;         /* homogeneous displacement at the start, when split */
+    double start, start_rate; /* homogeneous displacement and velocity at the start, when split */
     double level, level_rate; /* particular solution of the held input */
     double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
     double slow_part, fast_part; /* amplitudes of the two exponentials when overdamped */
@@ -100,7 +100,7 @@ void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *
 void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion);
 
 /* After `u` seconds, of a split segment its homogeneous part (without steady response and level), of a series all of it.
- * Bodies of many modes add these up. */
+ * Bodies of many modes add these up. At the start it is what the segment was begun with: no evaluation. */
 void vi_segment_part(const vi_segment *segment, double u, vi_part *part);
 
 /* Displacement and velocity after any u, the forcing phase there being known exactly (used for long free flights). */

@@ -8,26 +8,29 @@ void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const d
                      vi_phase phase, const double held[], const double held_rate[], double length, bool local)
 {
     flight->model = model;
-    flight->angle = phase.angle;
+    flight->phase = phase;
     flight->angular_frequency = model->clock.angular_frequency;
     flight->length = length;
-    for (int j = 0; j < model->modes; ++j) {
-        vi_segment_start(&flight->segment[j], &model->mode[j], q[j], p[j], phase, held[j], held_rate[j], length, local);
-        flight->length = vi_min(flight->length, flight->segment[j].length);
+    flight->series = false;
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        vi_segment *segment = &flight->segment[j];
+        vi_segment_start(segment, &model->mode[j], q[j], p[j], phase, held[j], held_rate[j], length, local);
+        flight->length = vi_min(flight->length, segment->length);
+        flight->series = flight->series || segment->series;
     }
 }
 
 void vi_flight_follow(vi_flight *flight, vi_instant now, const double q[], const double p[], const vi_origin origin[])
 {
     vi_since since = {now, 0.0, 0.0};
-    for (int j = 0; j < flight->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         vi_origin_follow(&origin[j], &flight->segment[j], &flight->model->clock, now, q[j], p[j], &since);
     }
 }
 
 void vi_flight_reach(const vi_flight *flight, vi_instant start, const double q[], const double p[], vi_origin origin[])
 {
-    for (int j = 0; j < flight->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         vi_origin_reach(&origin[j], &flight->segment[j], start, q[j], p[j]);
     }
 }
@@ -36,7 +39,7 @@ void vi_point_start(vi_point *point, const vi_flight *flight, const double shape
 {
     *point = (vi_point){.shape = shape, .sign = sign, .scale = fabs(clearance)};
     double start = 0.0;
-    for (int j = 0; j < flight->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
         point->scale += fabs(shape[j]) * segment->scale;
         if (segment->series) {
@@ -48,55 +51,59 @@ void vi_point_start(vi_point *point, const vi_flight *flight, const double shape
         point->level += shape[j] * segment->level;
         point->level_rate += shape[j] * segment->level_rate;
     }
-    start += point->cosine * cos(flight->angle) + point->sine * sin(flight->angle) + point->level;
+    start += point->cosine * flight->phase.cosine + point->sine * flight->phase.sine + point->level;
+    point->steady = sqrt(point->cosine * point->cosine + point->sine * point->sine);
     point->offset = clearance + sign * start;
 }
 
-void vi_flight_parts(const vi_flight *flight, double u, vi_part parts[])
+void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
 {
-    for (int j = 0; j < flight->model->modes; ++j) {
-        vi_segment_part(&flight->segment[j], u, &parts[j]);
+    const double angle = flight->phase.angle + flight->angular_frequency * u;
+    instant->u = u;
+    instant->cosine = u == 0.0 ? flight->phase.cosine : cos(angle);
+    instant->sine = u == 0.0 ? flight->phase.sine : sin(angle);
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
+        vi_segment_part(&flight->segment[j], u, &instant->part[j]);
     }
 }
 
 /* Displacement and its derivatives of the particular part; its bound on the fourth. */
-static vi_part particular(const vi_point *point, const vi_flight *flight, double u)
+static vi_part particular(const vi_point *point, const vi_flight *flight, const vi_flight_instant *now)
 {
-    const double w = flight->angular_frequency, angle = flight->angle + w * u;
-    const double c = cos(angle), s = sin(angle), square = w * w;
-    const double x = point->cosine * c + point->sine * s, v = w * (point->sine * c - point->cosine * s);
-    const double amplitude = sqrt(point->cosine * point->cosine + point->sine * point->sine);
-    return (vi_part){x + (point->level + point->level_rate * u), v + point->level_rate, -square * x, -square * v,
-                     square * square * amplitude, 0.0};
+    const double w = flight->angular_frequency, square = w * w;
+    const double x = point->cosine * now->cosine + point->sine * now->sine;
+    const double v = w * (point->sine * now->cosine - point->cosine * now->sine);
+    return (vi_part){x + (point->level + point->level_rate * now->u), v + point->level_rate, -square * x, -square * v,
+                     square * square * point->steady, 0.0};
 }
 
-vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, const vi_part parts[], double u)
+vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant)
 {
-    vi_part sum = particular(point, flight, u);
-    for (int j = 0; j < flight->model->modes; ++j) {
-        vi_part_add(&sum, point->shape[j], &parts[j]);
+    vi_part sum = particular(point, flight, instant);
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
+        vi_part_add(&sum, point->shape[j], &instant->part[j]);
     }
     return vi_part_approach(&sum, point->offset, point->sign);
 }
 
-double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_part parts[], double u, double horizon)
+double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant, double horizon)
 {
-    const int n = flight->model->modes;
+    const int n = vi_structure_modes(flight->model);
     vi_part sum[VI_MODES + 1]; /* of the particular part and the first modes */
     double ripple[VI_MODES];
-    sum[0] = particular(point, flight, u);
+    sum[0] = particular(point, flight, instant);
     for (int j = 0; j < n; ++j) {
         sum[j + 1] = sum[j];
-        vi_part_add(&sum[j + 1], point->shape[j], &parts[j]);
-        ripple[j] = fabs(point->shape[j]) * parts[j].reach;
+        vi_part_add(&sum[j + 1], point->shape[j], &instant->part[j]);
+        ripple[j] = fabs(point->shape[j]) * instant->part[j].reach;
     }
     return vi_rippling_step(sum, ripple, n, point->offset, point->sign, horizon);
 }
 
 bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *largest)
 {
-    double reach = sqrt(point->cosine * point->cosine + point->sine * point->sine) + point->sign * point->level;
-    for (int j = 0; j < flight->model->modes; ++j) {
+    double reach = point->steady + point->sign * point->level;
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
         const vi_mode *mode = segment->mode;
         if (point->shape[j] == 0.0) {
@@ -113,7 +120,7 @@ bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *larg
 
 void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], double p[])
 {
-    for (int j = 0; j < flight->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
         if (segment->series) {
             vi_part part;
@@ -123,5 +130,27 @@ void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], 
         } else {
             vi_segment_end(segment, u, angle, &q[j], &p[j]);
         }
+    }
+}
+
+void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instant, double moment, double q[],
+                        double p[])
+{
+    const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment / 3.0;
+    const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn / 6.0);
+    const double c = instant->cosine * less - instant->sine * more, s = instant->sine * less + instant->cosine * more;
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
+        const vi_segment *segment = &flight->segment[j];
+        const vi_mode *mode = segment->mode;
+        const vi_part *part = &instant->part[j];
+        q[j] = part->x + moment * (part->v + half * (part->a + third * part->j));
+        p[j] = part->v + moment * (part->a + half * part->j);
+        if (segment->series) {
+            q[j] += segment->origin;
+            continue;
+        }
+        q[j] += (mode->steady_cos * c + mode->steady_sin * s)
+                + (segment->level + segment->level_rate * (instant->u + moment));
+        p[j] += w * (mode->steady_sin * c - mode->steady_cos * s) + segment->level_rate;
     }
 }

@@ -12,6 +12,7 @@
 #include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
 #include "body/modal/structure_record.h"
+#include "body/modal/structure_search.h"
 #include "body/modal/structure_settle.h"
 #include "motion/majorant.h"
 
@@ -20,8 +21,6 @@
 static const double ONE_RELEASE = 16.0 * DBL_EPSILON;
 /* Least length of a low bounce's flight, in radians of the fastest rate: it is only the reach of the search. */
 static const double LEAST_BOUNCE = 1e-6;
-/* The last step to a contact is shorter than this over the fastest rate. */
-static const double LAST_STEP = 1e-5;
 /* Modal displacements and velocities below this have squares below the smallest normal number. */
 static const double SMALLEST = 1e-154;
 
@@ -43,12 +42,18 @@ static double landing_room(const vi_structure *s)
     return external ? vi_landing_room(vi_clock_time(&s->model->clock, s->state->now)) : 0.0;
 }
 
+/* Does a contact of this instant wait for its answer? One that is at the end of the step does in any case. */
+static bool stops_here(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    const double room = landing_room(s); /* 0 where no contact asks */
+    return request->stop_at_contacts
+           || (room > 0.0 && fabs(vi_clock_elapsed(&s->model->clock, s->state->now, target)) <= room);
+}
+
 static void record_period(const vi_structure *s)
 {
-    const double *observed = s->model->observed;
-    vi_record_period(s->record, vi_clock_time(&s->model->clock, s->state->now),
-                     vi_structure_at(s->model, observed, s->state->q),
-                     vi_structure_at(s->model, observed, s->state->p));
+    vi_record_period(s->record, vi_clock_time(&s->model->clock, s->state->now), vi_structure_observed(s),
+                     vi_structure_at(s->model, s->model->observed, s->state->p));
 }
 
 /* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
@@ -79,121 +84,10 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 
 /* ---- flight ---- */
 
-/* Land on the contact found at this approach: one step of the parabola that touches the motion there; none where the
- * velocity is no more than rounding, as the clearance is. */
-static double land(const vi_structure_model *model, const vi_approach *p, double u)
-{
-    const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
-    const double step = square >= 0.0 ? 2.0 * p->clearance / (p->velocity + sqrt(square))
-                                      : -p->velocity / p->acceleration;
-    return step * model->fastest < LAST_STEP ? u + step : u;
-}
-
-/* What a contact that leaves its stop does at once is known exactly. */
-static void correct_start(const vi_structure *s, int k, vi_approach *p)
-{
-    if (s->state->status[k] == VI_CONTACT_TOUCHING) {
-        p->clearance = 0.0;
-        p->velocity = s->state->leaving[k] ? 0.0 : p->velocity;
-        p->acceleration = s->state->leaving[k] >= 2 ? 0.0 : p->acceleration;
-    }
-}
-
-/* Does a contact that is at its stop but for rounding approach it by no more than rounding, before it is pulled off? */
-static bool turns_back(const vi_approach *p, double noise)
-{
-    return p->clearance <= noise && p->velocity > 0.0
-           && p->velocity * p->velocity <= -2.0 * p->acceleration * noise;
-}
-
-/* In place of a contact: the motion goes beyond the largest numbers. */
-enum { BEYOND_NUMBERS = -2 };
-
-/* First contact after the start of the flight: its index, with *u; -1 when there is none up to *u, the end of the flight
- * or of a long search. */
-static int locate(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u)
-{
-    vi_part parts[VI_MODES];
-    vi_budget *budget = &s->state->budget;
-    *u = 0.0;
-    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
-        double step = flight->length - *u;
-        int nearest = -1, landing_on = -1;
-        vi_budget_spend(budget, s->model->modes);
-        vi_flight_parts(flight, *u, parts);
-        for (int k = 0; k < s->model->contacts; ++k) {
-            if (!vi_structure_watched(s, k)) {
-                continue;
-            }
-            vi_approach p = vi_point_approach(&points[k], flight, parts, *u);
-            const bool starts = *u == 0.0 && s->state->status[k] == VI_CONTACT_TOUCHING;
-            if (starts) {
-                correct_start(s, k, &p);
-            }
-            if (!isfinite(p.bound) || !isfinite(p.jerk)) {
-                return BEYOND_NUMBERS;
-            }
-            p.clearance = vi_max(0.0, p.clearance);
-            if (*u == 0.0 && turns_back(&p, VI_ROUNDING * points[k].scale)) {
-                p.velocity = 0.0;
-            }
-            if (p.velocity > 0.0 && p.clearance <= VI_ROUNDING * points[k].scale) {
-                *u = land(s->model, &p, *u);
-                return k;
-            }
-            const double seconds = vi_seconds_to_landing(&p, s->model->fastest, points[k].scale);
-            const double certified = vi_min(seconds, starts ? vi_certified_step(&p, step)
-                                                            : vi_point_step(&points[k], flight, parts, *u, step));
-            if (certified < step) {
-                step = certified;
-                nearest = k;
-                landing_on = certified == seconds ? k : -1;
-            }
-        }
-        if (nearest < 0) {
-            *u = flight->length;
-            return -1;
-        }
-        if (landing_on >= 0 || *u + step == *u) {
-            *u += step;
-            return nearest;
-        }
-        *u += step;
-    }
-    return -1;
-}
-
-static void start_points(const vi_structure *s, const vi_flight *flight, vi_point points[])
-{
-    for (int k = 0; k < s->model->contacts; ++k) {
-        vi_point_start(&points[k], flight, s->model->shape[k], vi_structure_direction(s, k),
-                       vi_structure_clearance(s, k));
-        points[k].scale += fabs(s->contacts[k].position);
-    }
-}
-
-/* Can no stop ever be reached again under the present input? Their envelopes prove it. */
-static bool out_of_reach(const vi_structure *s, const vi_flight *flight, const vi_point points[])
-{
-    for (int k = 0; k < s->model->contacts; ++k) {
-        double reach;
-        if (vi_structure_watched(s, k)
-            && (!vi_point_reach(&points[k], flight, &reach) || !(reach < points[k].sign * s->contacts[k].position))) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /* Is nothing wanted of the motion before the target, and one evaluation enough however far that is? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
-    for (int j = 0; j < s->model->modes; ++j) {
-        if (flight->segment[j].series) {
-            return false;
-        }
-    }
-    return !s->record->extrema && !s->record->periods && !s->state->follow_energies;
+    return !flight->series && !s->record->extrema && !s->record->periods && !s->state->follow_energies;
 }
 
 /* How long to follow the body from where it is, since a contact is about to meet its stop or slow to leave it, s;
@@ -224,7 +118,7 @@ static double low_bounce(const vi_structure *s)
 /* Contacts have changed the motion: the next flight begins anew. */
 static void forget_origins(const vi_structure *s)
 {
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         s->state->origin[j].known = 0;
     }
 }
@@ -247,42 +141,46 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     const double length = segment_length(s, target, &end), bounce = low_bounce(s);
     const double room = end == VI_ENDS_AT_TARGET ? landing_room(s) : 0.0;
     vi_structure_state *state = s->state;
-    double held[VI_MODES], u;
+    double held[VI_MODES];
     vi_flight flight;
     vi_point points[VI_PORTS];
+    vi_search_found found;
     vi_structure_held_now(s, held);
     vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
                     vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
     vi_flight_follow(&flight, state->now, state->q, state->p, state->origin);
-    start_points(s, &flight, points);
-    const bool unreachable = out_of_reach(s, &flight, points);
-    if (unreachable && only_end_matters(s, &flight)) {
+    vi_search_points(s, &flight, points);
+    const bool idle = vi_search_is_idle(s, &flight, points);
+    if (idle && only_end_matters(s, &flight)) {
         fly_free(s, &flight, target);
         return true;
     }
-    u = flight.length;
-    const int k = unreachable ? -1 : locate(s, &flight, points, &u);
-    if (k == BEYOND_NUMBERS) {
+    found.u = flight.length;
+    const vi_search_end came_to = idle ? VI_SEARCH_NOTHING : vi_search_flight(s, &flight, points, &found);
+    if (came_to == VI_SEARCH_BEYOND) {
         return false;
     }
-    const bool whole = k < 0 && u >= length;
-    u = whole ? length : u; /* the room after the end was only searched */
+    const bool meets = came_to == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
+    const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
         vi_extremes_of_flight(s, &flight, u);
     }
     if (state->follow_energies) {
         vi_energies_of_flight(s, &flight, held, u);
     }
-    vi_flight_end(&flight, u, flight.angle + flight.angular_frequency * u, state->q, state->p);
-    if (k < 0) {
+    if (meets && isfinite(found.moment)) {
+        vi_flight_end_near(&flight, &found.now, found.moment, state->q, state->p);
+    } else {
+        vi_flight_end(&flight, u, flight.phase.angle + flight.angular_frequency * u, state->q, state->p);
+    }
+    if (!meets) {
         vi_flight_reach(&flight, state->now, state->q, state->p, state->origin);
         move(s, u, whole ? end : VI_ENDS_ANYWHERE, target);
         return true;
     }
     forget_origins(s);
     move(s, u, vi_ending_at(end, u, length, room), target);
-    const double remaining = vi_clock_elapsed(&s->model->clock, state->now, target);
-    vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+    vi_structure_meet(s, found.contact, stops_here(s, target, request));
     return true;
 }
 
@@ -293,7 +191,7 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
 static void end_smallest(const vi_structure *s)
 {
     vi_structure_state *state = s->state;
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         if (fabs(state->q[j]) < SMALLEST && fabs(state->p[j]) < SMALLEST) {
             state->q[j] = state->p[j] = 0.0;
         }
@@ -311,14 +209,13 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     forget_origins(s);
     const bool whole = event == VI_DRIFT_NO_EVENT && u >= length;
     move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? VI_ENDS_ANYWHERE : vi_ending_at(end, u, length, room), target);
-    const double remaining = vi_clock_elapsed(&s->model->clock, s->state->now, target);
     if (event != VI_DRIFT_NO_EVENT) {
         end_smallest(s);
     }
     switch (event) {
     case VI_DRIFT_NO_EVENT: break;
     case VI_DRIFT_ARRIVAL:
-        vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+        vi_structure_meet(s, k, stops_here(s, target, request));
         break;
     /* a load that has changed at once lifts the contact off with an acceleration, unless others hold its point; else
      * its force has fallen to 0 */
@@ -370,6 +267,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     fresh.follow_energies = state->follow_energies;
     fresh.exchange = state->exchange;
     fresh.now = fresh.held_since = now;
+    fresh.phase = vi_phase_of(0.0);
     vi_budget_start(&fresh.budget, now);
     *state = fresh;
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -381,24 +279,24 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
 
 /* ---- a step ---- */
 
-/* Is the motion still one of finite numbers? */
+/* Is the motion still one of finite numbers, its energy too? */
 static bool is_finite(const vi_structure *s)
 {
     double sum = 0.0;
-    for (int j = 0; j < s->model->modes; ++j) {
-        sum += fabs(s->state->q[j]) + fabs(s->state->p[j]);
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        sum += fabs(s->state->q[j]) + s->state->p[j] * s->state->p[j];
     }
     return sum <= DBL_MAX;
 }
 
-static void begin_step(const vi_structure *s, const vi_step_request *request)
+static void begin_step(const vi_structure *s)
 {
-    vi_record_begin_step(s->record, vi_structure_at(s->model, s->model->observed, s->state->q));
+    vi_record_begin_step(s->record, vi_structure_observed(s));
     for (int k = 0; k < s->model->contacts; ++k) {
         s->contacts[k].event_time = NAN;
     }
     if (!s->state->budget.unfinished) {
-        vi_structure_settle(s, request);
+        vi_structure_settle(s, true); /* nothing of the step is over yet */
     }
     if (s->record->periods && !s->record->period_open && s->state->now.rest == 0.0) {
         record_period(s);
@@ -421,13 +319,13 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if ((!coupled && !fly(s, target, request)) || !is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
-    vi_structure_settle(s, request);
+    vi_structure_settle(s, stops_here(s, target, request));
     return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
 }
 
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
-    begin_step(s, request);
+    begin_step(s);
     /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
     const bool ends_when_full = request->early_return && !vi_record_full(s->record);
     vi_step_result result = VI_STEP_DONE;

@@ -26,7 +26,7 @@ void vi_structure_component_defaults(vi_structure_component *c)
 /* The engine's view of the parts. */
 static vi_structure parts_of(vi_structure_component *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan};
 }
 
 void vi_structure_component_sized(vi_structure_component *c, const char *block, int count)
@@ -79,8 +79,10 @@ static void check_contact(char *message, int k, const vi_contact *contact)
 {
     const vi_contact_law *law = &contact->law;
     if (!law_exists(law->law)) {
-        vi_complain(message, "contact[%d].law: expected 0 (none) to 7 (pair), got %lld", k + 1,
-                    (long long)law->law);
+        vi_complain(message,
+                    "contact[%d].law: expected 0 (none), 1 (restitution), 2 (kelvin_voigt), 3 (hertz),"
+                    " 4 (hunt_crossley), 5 (external), 6 (external_force) or 7 (pair), got %lld",
+                    k + 1, (long long)law->law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
         vi_complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", k + 1,
@@ -139,7 +141,7 @@ int vi_structure_component_ports(const vi_structure_component *c)
 
 static bool at_one_point(const vi_structure_model *model, int i, int j)
 {
-    return memcmp(model->shape[i], model->shape[j], (size_t)model->modes * sizeof(double)) == 0;
+    return memcmp(model->shape[i], model->shape[j], (size_t)vi_structure_modes(model) * sizeof(double)) == 0;
 }
 
 /* Does the body meet stop i first, for good? A rigid one is never passed. */
@@ -325,7 +327,7 @@ void vi_structure_component_outputs(vi_structure_component *c, double base_accel
 {
     const vi_structure parts = parts_of(c);
     vi_structure_outputs(&parts, c->modal_acceleration);
-    c->displacement = vi_structure_at(&c->model, c->model.observed, c->state.q);
+    c->displacement = vi_structure_observed(&parts);
     c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
     c->acceleration = vi_structure_at(&c->model, c->model.observed, c->modal_acceleration) + base_acceleration;
     update_energies(c);
@@ -421,5 +423,5 @@ bool vi_structure_component_needs_events(const vi_structure_component *c)
 
 size_t vi_structure_component_unused(const vi_structure_component *c)
 {
-    return vi_record_unused(&c->record) + sizeof c->pressed;
+    return vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan;
 }

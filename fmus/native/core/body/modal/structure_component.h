@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "body/complaint.h"
+#include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 #include "body/modal/structure_exchange.h"
@@ -35,7 +36,8 @@ typedef struct {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     vi_record record;   /* it is saved only as far as it is used, and nothing after it */
-    vi_pressed pressed; /* what follows from the rest */
+    vi_pressed pressed; /* this and `scan` follow from the rest */
+    vi_scan scan;
 } vi_structure_component;
 
 void vi_structure_component_defaults(vi_structure_component *c);

@@ -61,7 +61,7 @@ static void find_nominals(const vi_structure *s)
     const vi_structure_model *model = s->model;
     const vi_structure_state *state = s->state;
     double displacement = 0.0, velocity = 0.0, slowest = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const double own = mode->natural > 0.0 ? mode->natural : mode->angular_frequency;
         const double rate = own > 0.0 ? own : 1.0;
@@ -107,7 +107,7 @@ bool vi_exchange_set_time(const vi_exchange_body *body, double time)
 /* From the body's modes to the description's, of which those that are not in use are 0. */
 static void show(const vi_exchange_body *body, const double modal[], double shown[])
 {
-    const int used = body->parts.model->modes;
+    const int used = vi_structure_modes(body->parts.model);
     for (int j = 0; j < body->modes; ++j) {
         if (body->shape != NULL) {
             shown[j] = j < used ? vi_structure_at(body->parts.model, body->shape[j], modal) : 0.0;
@@ -120,7 +120,7 @@ static void show(const vi_exchange_body *body, const double modal[], double show
 /* And back: q = Psi' M x is the inverse of x = Psi q. */
 static void take(const vi_exchange_body *body, const double shown[], double modal[])
 {
-    const int used = body->parts.model->modes;
+    const int used = vi_structure_modes(body->parts.model);
     for (int j = 0; j < used; ++j) {
         modal[j] = body->shape != NULL ? 0.0 : body->scale * shown[j];
         for (int i = 0; i < used && body->shape != NULL; ++i) {
@@ -144,7 +144,7 @@ void vi_exchange_set_states(const vi_exchange_body *body, const double states[])
 void vi_exchange_get_nominals(const vi_exchange_body *body, double nominals[])
 {
     for (int j = 0; j < body->modes; ++j) {
-        const double scale = body->mass == NULL ? body->scale : j < body->parts.model->modes ? sqrt(body->mass[j]) : 1.0;
+        const double scale = body->mass == NULL ? body->scale : j < vi_structure_modes(body->parts.model) ? sqrt(body->mass[j]) : 1.0;
         nominals[j] = body->parts.state->exchange.displacement / scale;
         nominals[body->modes + j] = body->parts.state->exchange.velocity / scale;
     }
@@ -282,14 +282,13 @@ static void look_at_all(const vi_structure *s)
 /* Impacts set off by impacts, rests and releases, until nothing more happens at this instant. */
 static void settle(const vi_structure *s)
 {
-    static const vi_step_request request = {0.0, 0.0, false, false};
     for (int look = 0; look < MOST_LOOKS; ++look) {
         int32_t status[VI_PORTS], leaving[VI_PORTS];
         double p[VI_MODES];
         memcpy(status, s->state->status, sizeof status);
         memcpy(leaving, s->state->leaving, sizeof leaving);
         memcpy(p, s->state->p, sizeof p);
-        vi_structure_settle(s, &request);
+        vi_structure_settle(s, false);
         if (memcmp(status, s->state->status, sizeof status) == 0 && memcmp(p, s->state->p, sizeof p) == 0
             && memcmp(leaving, s->state->leaving, sizeof leaving) == 0) {
             return;
@@ -301,7 +300,7 @@ bool vi_exchange_event(const vi_exchange_body *body, bool *changed, bool *limit,
 {
     const vi_structure *s = &body->parts;
     double q[VI_MODES], p[VI_MODES];
-    const size_t size = (size_t)s->model->modes * sizeof q[0];
+    const size_t size = (size_t)vi_structure_modes(s->model) * sizeof q[0];
     int32_t status[VI_PORTS];
     memcpy(q, s->state->q, size);
     memcpy(p, s->state->p, size);

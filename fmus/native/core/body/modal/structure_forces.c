@@ -42,7 +42,7 @@ vi_contact_force vi_structure_yield(const vi_structure *s, int k)
 void vi_structure_push(const vi_structure *s, int k, double force, double acceleration[])
 {
     const double push = vi_structure_direction(s, k) * force;
-    for (int j = 0; j < s->model->modes && push != 0.0; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
         acceleration[j] -= s->model->shape[k][j] * push;
     }
 }
@@ -54,7 +54,7 @@ void vi_structure_accelerate_freely(const vi_structure *s, double acceleration[]
     const vi_structure_state *state = s->state;
     const double cosine = vi_structure_phase(s).cosine;
     vi_structure_held_now(s, acceleration);
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         acceleration[j] += mode->force * cosine - mode->stiffness * state->q[j];
         acceleration[j] -= model->coupled ? vi_structure_at(model, model->coupling[j], state->p)

@@ -31,7 +31,7 @@ static double drag_at(const vi_structure *s, int k)
 {
     const vi_structure_model *model = s->model;
     double drag = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const double pulled = model->coupled ? vi_structure_at(model, model->coupling[j], model->impulse[k])
                                              : 2.0 * model->mode[j].decay * model->impulse[k][j];
         drag += model->shape[k][j] * pulled;
@@ -145,7 +145,7 @@ static void give_impulses(const vi_structure *s, const double impulse[], const d
 {
     for (int k = 0; k < s->model->contacts; ++k) {
         const double sign = vi_structure_direction(s, k), push = -sign * impulse[k], push_low = -sign * low[k];
-        for (int j = 0; j < s->model->modes && push != 0.0; ++j) {
+        for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
             const double gain = s->model->impulse[k][j], step = gain * push, before = s->state->p[j];
             const double sum = before + step, part = sum - before;
             const double rounding = (before - (sum - part)) + (step - part);
@@ -173,6 +173,14 @@ static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_
     vi_solve_active(n, g, left, active, more);
 }
 
+/* The impulse of a contact that is alone in play. */
+static void own_impulse(const vi_structure *s, int k, double wanted, double *impulse, double *impulse_low)
+{
+    const double g = s->model->mobility[k][k], p = wanted / g;
+    *impulse = p;
+    *impulse_low = (fma(-g, p, wanted) - s->model->mobility_low[k][k] * p) / g;
+}
+
 /* Solve for the impulses of the contacts in play; the others are out of the problem. */
 static void joint_impulses(const vi_structure *s, const int in_play[], const double wanted[], double impulse[],
                            double impulse_low[])
@@ -180,14 +188,19 @@ static void joint_impulses(const vi_structure *s, const int in_play[], const dou
     double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
     double b[VI_PORTS], p[VI_PORTS], more[VI_PORTS];
     int index[VI_PORTS], count = 0;
-    vi_structure_signed(s, s->model->mobility, whole);
-    vi_structure_signed(s, s->model->mobility_low, whole_low);
     for (int k = 0; k < s->model->contacts; ++k) {
         impulse[k] = impulse_low[k] = 0.0;
         if (in_play[k]) {
             index[count++] = k;
         }
     }
+    if (count == 1 && s->model->mobility[index[0]][index[0]] > 0.0) {
+        const int k = index[0];
+        own_impulse(s, k, wanted[k], &impulse[k], &impulse_low[k]);
+        return;
+    }
+    vi_structure_signed(s, s->model->mobility, whole);
+    vi_structure_signed(s, s->model->mobility_low, whole_low);
     for (int i = 0; i < count; ++i) {
         b[i] = wanted[index[i]];
         for (int j = 0; j < count; ++j) {
@@ -295,7 +308,7 @@ void vi_structure_take_impulses(const vi_structure *s)
             state->leaving[k] = 0;
         }
     }
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         state->origin[j].known = 0;
     }
 }

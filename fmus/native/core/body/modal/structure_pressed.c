@@ -179,7 +179,7 @@ static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double s
         u += vi_max(vi_pressed_step(&sight, flow, part, u, end - u), least_step);
         sight.offset -= room;
     }
-    vi_record_extend(s->record, sign * sight.offset);
+    vi_record_extend(s->record, vi_structure_within(s, sign * sight.offset));
 }
 
 /* ---- a rest ---- */
@@ -219,7 +219,7 @@ static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fast
     }
     vi_pressed_flow_reach(s);
     if (s->record->extrema) {
-        vi_record_extend(s->record, vi_structure_at(s->model, s->model->observed, state->q));
+        vi_record_extend(s->record, vi_structure_observed(s));
     }
 }
 

@@ -19,13 +19,18 @@ enum { CLIMB = 8 };
 
 /* ---- extremes ---- */
 
+static void extend(const vi_structure *s, double displacement)
+{
+    vi_record_extend(s->record, vi_structure_within(s, displacement));
+}
+
 /* Climb from u to the next turning point of the observed displacement times sign; returns its time. */
 static double climb(const vi_flight *flight, const vi_point *point, double u, double end, double *top)
 {
-    vi_part parts[VI_MODES];
+    vi_flight_instant now;
     for (int evaluation = 0;; ++evaluation) {
-        vi_flight_parts(flight, u, parts);
-        const vi_approach p = vi_point_approach(point, flight, parts, u);
+        vi_flight_at(flight, u, &now);
+        const vi_approach p = vi_point_approach(point, flight, &now);
         *top = p.clearance; /* of a stop above: falls as the point rises */
         const double noise = 4.0 * DBL_EPSILON * (fabs(p.velocity) + point->scale * flight->model->fastest);
         if (!(p.velocity > noise) || u >= end) {
@@ -40,9 +45,9 @@ static double climb(const vi_flight *flight, const vi_point *point, double u, do
 /* Largest displacement * sign over the flight: regions that stay below the largest one seen are passed over. */
 static void extreme(const vi_structure *s, const vi_flight *flight, double sign, double end)
 {
-    vi_part parts[VI_MODES];
+    vi_flight_instant now;
     vi_point point;
-    const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
+    const double here = vi_structure_observed(s);
     double best = s->record->displacement_max, u = 0.0;
     if (sign < 0.0) {
         best = -s->record->displacement_min;
@@ -52,29 +57,29 @@ static void extreme(const vi_structure *s, const vi_flight *flight, double sign,
     const double start = point.offset, least = VI_ROUNDING * point.scale;
     for (int evaluation = 0; u < end; ++evaluation) {
         const double least_step = vi_least_step(end, 1e-9, evaluation);
-        vi_budget_spend(&s->state->budget, s->model->modes);
-        vi_flight_parts(flight, u, parts);
-        const vi_approach p = vi_point_approach(&point, flight, parts, u);
+        vi_budget_spend(&s->state->budget, vi_structure_modes(s->model));
+        vi_flight_at(flight, u, &now);
+        const vi_approach p = vi_point_approach(&point, flight, &now);
         if (p.clearance <= least && p.velocity > 0.0) {
             double top;
             u = climb(flight, &point, u, end, &top);
-            vi_budget_spend(&s->state->budget, CLIMB * s->model->modes);
+            vi_budget_spend(&s->state->budget, CLIMB * vi_structure_modes(s->model));
             point.offset += vi_max(0.0, -top); /* the bar is raised to what was reached */
             u += least_step;
             continue;
         }
         point.offset += least;
-        u += vi_max(vi_point_step(&point, flight, parts, u, end - u), least_step);
+        u += vi_max(vi_point_step(&point, flight, &now, end - u), least_step);
         point.offset -= least;
     }
-    vi_flight_parts(flight, end, parts);
-    point.offset += vi_max(0.0, -vi_point_approach(&point, flight, parts, end).clearance);
-    vi_record_extend(s->record, sign * (best + (point.offset - start)));
+    vi_flight_at(flight, end, &now);
+    point.offset += vi_max(0.0, -vi_point_approach(&point, flight, &now).clearance);
+    extend(s, sign * (best + (point.offset - start)));
 }
 
 void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u)
 {
-    vi_record_extend(s->record, vi_structure_at(s->model, s->model->observed, s->state->q));
+    vi_record_extend(s->record, vi_structure_observed(s));
     if (u > 0.0) {
         extreme(s, flight, 1.0, u);
         extreme(s, flight, -1.0, u);
@@ -94,9 +99,9 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
     double polynomial[VI_ORDER + 1], slope[VI_ORDER + 1], value[4], from = 0.0;
     const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
     vi_drift_point(drift, s->model->observed, polynomial);
-    vi_record_extend(s->record, here);
+    extend(s, here);
     vi_polynomial_at(polynomial, u, value);
-    vi_record_extend(s->record, here + value[0]);
+    extend(s, here + value[0]);
     if (vi_polynomial_size(polynomial, u) <= VI_ROUNDING * fabs(here)) {
         return; /* it is held: what its polynomial says is rounding */
     }
@@ -109,7 +114,7 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
             return;
         }
         vi_polynomial_at(polynomial, fall.time, value);
-        vi_record_extend(s->record, here + value[0]);
+        extend(s, here + value[0]);
         from = fall.time + 1e-3 * u;
     }
 }
@@ -123,7 +128,7 @@ static void add_powers(const vi_structure *s, const double p[], const double hel
     const vi_structure_model *model = s->model;
     const double cosine = cos(angle);
     double work = 0.0, loss = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         work += (mode->force * cosine + held[j] + s->state->held_rate[j] * u) * p[j];
         loss += p[j] * (model->coupled ? vi_structure_at(model, model->coupling[j], p) : 2.0 * mode->decay * p[j]);
@@ -149,10 +154,10 @@ void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const
 {
     const double count = ceil(vi_max(1.0, u * s->model->fastest / PIECE)), piece = u / count;
     double q[VI_MODES], p[VI_MODES], weight;
-    vi_budget_spend(&s->state->budget, (int64_t)(8.0 * count) * s->model->modes);
+    vi_budget_spend(&s->state->budget, (int64_t)(8.0 * count) * vi_structure_modes(s->model));
     for (double n = 0.0; n < count; n += 1.0) {
         for (int i = 0; i < 8; ++i) {
-            const double t = node(n * piece, piece, i, &weight), angle = flight->angle + flight->angular_frequency * t;
+            const double t = node(n * piece, piece, i, &weight), angle = flight->phase.angle + flight->angular_frequency * t;
             vi_flight_end(flight, t, angle, q, p);
             add_powers(s, p, held, t, angle, weight);
         }
@@ -185,7 +190,7 @@ void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const
     const double cosine = cos(s->model->clock.angular_frequency * (s->state->now.rest + u)), zero[VI_MODES] = {0.0};
     double moved[VI_MODES], p[VI_MODES], work = 0.0, way = 0.0, undone = 0.0;
     vi_drift_at(drift, u, zero, p, moved);
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const double back = q[j] + moved[j] - s->state->q[j];
         work += (s->model->mode[j].force * cosine + held[j] + s->state->held_rate[j] * u) * back;
         way += fabs(moved[j]);

@@ -115,7 +115,7 @@ static void settle_resting(const vi_structure *s, const int candidate[])
     }
 }
 
-void vi_structure_settle(const vi_structure *s, const vi_step_request *request)
+void vi_structure_settle(const vi_structure *s, bool stop_here)
 {
     vi_structure_state *state = s->state;
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -142,7 +142,7 @@ void vi_structure_settle(const vi_structure *s, const vi_step_request *request)
         any_candidate |= candidate[k] && state->status[k] == VI_CONTACT_TOUCHING;
     }
     if (first >= 0) {
-        if (!vi_structure_ask(s, hit, request->stop_at_contacts)) {
+        if (!vi_structure_ask(s, hit, stop_here)) {
             vi_structure_resolve_hits(s, hit);
         }
         return;

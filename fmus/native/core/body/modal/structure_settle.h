@@ -3,9 +3,9 @@
 #define VIBROIMPACT_STRUCTURE_SETTLE_H
 
 #include "body/modal/structure_state.h"
-#include "body/step.h"
 
-/* What the contacts that touch do now, after inputs or states changed: hit, rest, yield or leave. */
-void vi_structure_settle(const vi_structure *s, const vi_step_request *request);
+/* What the contacts that touch do now, after inputs or states changed: hit, rest, yield or leave. `stop_here`: one with an
+ * external law that is hit waits for its answer; else the body flies through. */
+void vi_structure_settle(const vi_structure *s, bool stop_here);
 
 #endif

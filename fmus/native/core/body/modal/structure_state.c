@@ -13,22 +13,13 @@ void vi_structure_mode(vi_structure_model *model, int j, double natural, double 
     vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * natural, natural * natural, force, angular_frequency);
 }
 
-double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[])
-{
-    double sum = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
-        sum += shape[j] * vector[j];
-    }
-    return sum;
-}
-
 /* A bound on the rates that a full damping matrix brings. */
 static double coupling_rate(const vi_structure_model *model)
 {
     double most = 0.0;
-    for (int i = 0; i < model->modes && model->coupled; ++i) {
+    for (int i = 0; i < vi_structure_modes(model) && model->coupled; ++i) {
         double sum = 0.0;
-        for (int j = 0; j < model->modes; ++j) {
+        for (int j = 0; j < vi_structure_modes(model); ++j) {
             sum += fabs(model->coupling[i][j]);
         }
         most = vi_max(most, sum);
@@ -40,7 +31,7 @@ static double coupling_rate(const vi_structure_model *model)
 static double twofold_dot(const vi_structure_model *model, const double shape[], const double impulse[], double *low)
 {
     double sum = 0.0, left = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const double product = shape[j] * impulse[j], total = sum + product, part = total - sum;
         left += fma(shape[j], impulse[j], -product) + ((sum - (total - part)) + (product - part));
         sum = total;
@@ -58,8 +49,11 @@ void vi_structure_prepare(vi_structure_model *model)
             model->compliance[k][l] = vi_structure_at(model, model->shape[k], model->shape[l]);
         }
     }
+    for (int k = 0; k < model->contacts; ++k) {
+        model->at_observed[k] = memcmp(model->shape[k], model->observed, (size_t)vi_structure_modes(model) * sizeof(double)) == 0;
+    }
     model->fastest = coupling_rate(model);
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
         model->fastest = vi_max(model->fastest, rate);
@@ -74,7 +68,7 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
         past[3 + k] = &state->separated[k];
     }
     vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 3);
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
         state->origin[j].known = 0;
     }
@@ -85,28 +79,30 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
 
 /* ---- the present instant ---- */
 
-double vi_structure_direction(const vi_structure *s, int k)
-{
-    return vi_contact_direction(s->contacts[k].side);
-}
-
 vi_phase vi_structure_phase(const vi_structure *s)
 {
-    return vi_phase_of(s->model->clock.angular_frequency * s->state->now.rest);
+    const double angle = s->model->clock.angular_frequency * s->state->now.rest;
+    if (angle != s->state->phase.angle) {
+        s->state->phase = vi_phase_of(angle);
+    }
+    return s->state->phase;
 }
 
 void vi_structure_held_now(const vi_structure *s, double held[])
 {
     const vi_structure_state *state = s->state;
-    const double elapsed = vi_clock_elapsed(&s->model->clock, state->held_since, state->now);
-    for (int j = 0; j < s->model->modes; ++j) {
-        held[j] = state->held[j] + state->held_rate[j] * elapsed;
+    bool slopes = false;
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        held[j] = state->held[j];
+        slopes = slopes || state->held_rate[j] != 0.0;
     }
-}
-
-double vi_structure_approach(const vi_structure *s, int k)
-{
-    return vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], s->state->p);
+    if (!slopes) {
+        return;
+    }
+    const double elapsed = vi_clock_elapsed(&s->model->clock, state->held_since, state->now);
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        held[j] += state->held_rate[j] * elapsed;
+    }
 }
 
 double vi_structure_clearance(const vi_structure *s, int k)
@@ -120,10 +116,39 @@ double vi_structure_clearance(const vi_structure *s, int k)
     return vi_structure_direction(s, k) * (s->contacts[k].position - displacement);
 }
 
+/* Is the stop one that impacts alone are answered with, and is the contact met there? */
+static bool is_rigid(const vi_structure *s, int k)
+{
+    const int64_t law = s->contacts[k].law.law;
+    return vi_structure_watched(s, k) && (law == VI_LAW_RESTITUTION || law == VI_LAW_EXTERNAL);
+}
+
+double vi_structure_within(const vi_structure *s, double displacement)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const double sign = vi_structure_direction(s, k), stop = s->contacts[k].position;
+        if (s->model->at_observed[k] && sign * displacement > sign * stop && is_rigid(s, k)) {
+            displacement = stop;
+        }
+    }
+    return displacement;
+}
+
+double vi_structure_observed(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int32_t status = s->state->status[k];
+        if (s->model->at_observed[k] && (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD)) {
+            return s->contacts[k].position;
+        }
+    }
+    return vi_structure_within(s, vi_structure_at(s->model, s->model->observed, s->state->q));
+}
+
 static double size_at(const vi_structure_model *model, const double shape[], const double vector[])
 {
     double sum = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         sum += fabs(shape[j] * vector[j]);
     }
     return sum;
@@ -139,7 +164,7 @@ double vi_structure_velocity_size(const vi_structure *s, int k)
     const vi_structure_model *model = s->model;
     const double radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
     double sum = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const double loads = fabs(mode->force) + fabs(s->state->held[j]);
         sum += fabs(model->shape[k][j])
@@ -151,11 +176,6 @@ double vi_structure_velocity_size(const vi_structure *s, int k)
 double vi_structure_kinetic(const vi_structure *s)
 {
     return 0.5 * vi_structure_at(s->model, s->state->p, s->state->p);
-}
-
-bool vi_structure_watched(const vi_structure *s, int k)
-{
-    return vi_contact_law_has_stop(s->contacts[k].law.law) && !s->state->passed;
 }
 
 int vi_structure_beyond(const vi_structure *s)
@@ -185,8 +205,8 @@ void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH
 void vi_structure_hold(const vi_structure *s, const double held[], const double held_rate[])
 {
     vi_structure_state *state = s->state;
-    memcpy(state->held, held, (size_t)s->model->modes * sizeof held[0]);
-    memcpy(state->held_rate, held_rate, (size_t)s->model->modes * sizeof held_rate[0]);
+    memcpy(state->held, held, (size_t)vi_structure_modes(s->model) * sizeof held[0]);
+    memcpy(state->held_rate, held_rate, (size_t)vi_structure_modes(s->model) * sizeof held_rate[0]);
     if (state->exchange.on) { /* the importer gives the inputs at each instant: there is no step that slopes are for */
         memset(state->held_rate, 0, sizeof state->held_rate);
     }
@@ -203,7 +223,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
             continue;
         }
         const double push = vi_structure_direction(s, k) * contact->applied_force;
-        for (int j = 0; j < s->model->modes && push != 0.0; ++j) {
+        for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
             state->held[j] -= s->model->shape[k][j] * push;
         }
     }

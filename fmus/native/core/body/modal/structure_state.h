@@ -39,6 +39,7 @@ typedef struct {
     int32_t coupled;           /* the damping couples the modes: coupling[][] holds all of it */
     double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
     /* derived by vi_structure_prepare */
+    int32_t at_observed[VI_PORTS];         /* is the contact at the observed point? */
     double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
     double mobility_low[VI_PORTS][VI_PORTS]; /* its rounding: else it adds up over elastic impacts, always one way */
     double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
@@ -89,6 +90,7 @@ typedef struct {
     vi_standstill standstill;
     vi_budget budget;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
+    vi_phase phase;                  /* of the force, when it was last asked for */
     vi_origin origin[VI_MODES];
     vi_rest_origin rest;
     vi_instant held_since;
@@ -116,13 +118,18 @@ typedef struct {
 /* Modes of the body at rest on a contact: pressed_flow.h. */
 typedef struct vi_pressed vi_pressed;
 
+/* Samples of its flights: modal_scan.h. */
+typedef struct vi_scan vi_scan;
+
 /* The parts of one body, for the length of a call. */
 typedef struct {
     vi_structure_model *model;
     vi_structure_state *state;
     vi_contact *contacts; /* model->contacts of them */
     vi_record *record;
-    vi_pressed *pressed; /* no part of its state; NULL: long rests are followed by series, as short ones are */
+    /* no part of its state */
+    vi_pressed *pressed; /* NULL: long rests are followed by series, as short ones are */
+    vi_scan *scan;       /* NULL: flights are followed by certified steps alone */
 } vi_structure;
 
 /* Mode j: natural angular frequency (rad/s, >= 0), damping ratio (>= 0) and modal amplitude of the harmonic force.
@@ -146,6 +153,22 @@ void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH
 /* Does a contact lie beyond its stop by more than rounding? (a start state is refused then); its number or 0 */
 int vi_structure_beyond(const vi_structure *s);
 
+/* Modes in use. */
+static inline int vi_structure_modes(const vi_structure_model *model)
+{
+    return VI_ONLY_MODES > 0 ? VI_ONLY_MODES : model->modes;
+}
+
+/* shape . vector */
+static inline double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        sum += shape[j] * vector[j];
+    }
+    return sum;
+}
+
 /* Entry of the modal damping matrix, 1/s. */
 static inline double vi_structure_damping(const vi_structure_model *model, int i, int j)
 {
@@ -159,26 +182,38 @@ static inline double vi_structure_drag_size(const vi_structure_model *model, int
     if (!model->coupled) {
         return fabs(2.0 * model->mode[i].decay * rates[i]);
     }
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         size += fabs(model->coupling[i][j] * rates[j]);
     }
     return size;
 }
 
-/* shape . vector */
-double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[]);
 
 /* ---- the present instant ---- */
 
-double vi_structure_direction(const vi_structure *s, int k);
+/* +1 for a stop above the motion, -1 for one below. */
+static inline double vi_structure_direction(const vi_structure *s, int k)
+{
+    return vi_contact_direction(s->contacts[k].side);
+}
+
 vi_phase vi_structure_phase(const vi_structure *s);
 void vi_structure_held_now(const vi_structure *s, double held[]);
 
 /* sign * shape . p: speed towards the stop, m/s */
-double vi_structure_approach(const vi_structure *s, int k);
+static inline double vi_structure_approach(const vi_structure *s, int k)
+{
+    return vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], s->state->p);
+}
 
 /* Clearance of contact k, m: exactly 0 where it is known to touch. */
 double vi_structure_clearance(const vi_structure *s, int k);
+
+/* Displacement of the observed point, m. */
+double vi_structure_observed(const vi_structure *s);
+
+/* A displacement of the observed point, without the rounding that may put it beyond a rigid stop there. */
+double vi_structure_within(const vi_structure *s, double displacement);
 
 /* Size of the terms that a displacement, or a velocity, of contact k is the sum of: velocities that displacements and
  * loads turn into within a radian are among them. */
@@ -186,7 +221,10 @@ double vi_structure_displacement_size(const vi_structure *s, int k);
 double vi_structure_velocity_size(const vi_structure *s, int k);
 
 /* Is this contact looked for? */
-bool vi_structure_watched(const vi_structure *s, int k);
+static inline bool vi_structure_watched(const vi_structure *s, int k)
+{
+    return vi_contact_law_has_stop(s->contacts[k].law.law) && !s->state->passed;
+}
 
 /* Kinetic energy of the modes, J. */
 double vi_structure_kinetic(const vi_structure *s);
