@@ -25,11 +25,14 @@ typedef struct {
     double constant, stiffness, damping, exponent;
 } vi_press;
 
+/* Modes are taken in blocks of VI_LANES, which compilers turn into vectors; rows end with a whole block. */
+enum { VI_LANES = 4, VI_ROW = (VI_MODES + VI_LANES - 1) / VI_LANES * VI_LANES };
+
 typedef struct {
     const vi_structure_model *model;
     double length;                              /* valid for 0 <= u <= length, s */
     int order;                                  /* of the polynomials; VI_ORDER but for the first touch of a power law */
-    double modal[VI_ORDER + 1][VI_MODES];       /* modal displacements from the start; modal[0] = 0 */
+    double modal[VI_ORDER + 1][VI_ROW];         /* modal displacements from the start; modal[0] = 0 */
     double penetration[VI_PORTS][VI_ORDER + 1]; /* d of each contact; [0] is its value at the start */
     double force[VI_PORTS][VI_ORDER + 1];       /* F of each contact, N; the last two coefficients are 0 */
     double force_scale[VI_PORTS];               /* of holding forces: size of the terms added up, N */
