@@ -6,10 +6,13 @@
 
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
+#include "motion/power_series.h"
 
-/* Length of a segment times the fastest rate: the first term left out is below 1e-17 of the motion, and the largest
- * terms are 12 times it. */
-static const double REACH = 2.5;
+/* Length of a segment times the fastest rate: of any motion the first term left out is below 1e-17 of it, and the largest
+ * terms are 12 times it. Where the fast modes move little, longer: the first of these for which the last terms are this
+ * small beside the first. What is left out is less than half of the last term up to the longest. */
+static const double REACH = 2.5, REACHES[] = {5.0, 4.25, 3.6, 3.0};
+static const double NEGLIGIBLE = 1e-18;
 /* Of a power law the terms must fall by this over a segment: it has a singularity where the contact ends. */
 static const double SMALLEST_TERM = 0.01;
 /* In the first instants of a power law coefficient n is of size (rate / penetration)^n: the series ends before a
@@ -45,115 +48,54 @@ typedef struct {
     double stiffness[VI_ROW], drag[VI_ROW], force[VI_ROW]; /* drag: 0 where the damping couples the modes */
     double held[2][VI_ROW];                                /* constant load at the start, and its slope */
     double toward[VI_PORTS][VI_ROW];                       /* shapes, towards the stops */
+    int yields[VI_PORTS], yielding;                        /* the contacts that yield, and how many */
+    int is_held[VI_PORTS], any_held;
 } equation;
 
-static int whole_lanes(int count)
+static void set_up_contacts(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
-    return (count + VI_LANES - 1) / VI_LANES * VI_LANES;
-}
-
-static void set_up(equation *e, const vi_structure_model *model, const vi_drift_start *start)
-{
-    e->width = whole_lanes(model->modes);
-    for (int j = model->modes; j < e->width; ++j) {
-        e->stiffness[j] = e->drag[j] = e->force[j] = e->held[0][j] = e->held[1][j] = 0.0;
-    }
-    for (int j = 0; j < model->modes; ++j) {
-        const vi_mode *mode = &model->mode[j];
-        e->stiffness[j] = mode->stiffness;
-        e->drag[j] = model->coupled ? 0.0 : 2.0 * mode->decay;
-        e->force[j] = mode->force;
-        e->held[0][j] = start->held[j] - mode->stiffness * start->q[j];
-        e->held[1][j] = start->held_rate[j];
-    }
+    e->yielding = e->any_held = 0;
     for (int k = 0; k < model->contacts; ++k) {
+        const vi_press_kind kind = start->press[k].kind;
+        e->is_held[k] = kind == VI_PRESS_HOLD;
+        e->any_held |= e->is_held[k];
+        if (kind == VI_PRESS_LINEAR || kind == VI_PRESS_POWER) {
+            e->yields[e->yielding++] = k;
+        }
         for (int j = 0; j < e->width; ++j) {
             e->toward[k][j] = j < model->modes ? start->sign[k] * model->shape[k][j] : 0.0;
         }
     }
 }
 
-/* Sum of the products of two rows, lane by lane: the same bits for vectors of any width. */
-static inline double dot(const double *restrict a, const double *restrict b, int width)
+static void set_up(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
-    double sum[VI_LANES] = {0.0};
-    for (int j = 0; j < width; j += VI_LANES) {
-        for (int i = 0; i < VI_LANES; ++i) {
-            sum[i] += a[j + i] * b[j + i];
-        }
+    e->width = VI_WHOLE_LANES(model->modes);
+    for (int j = 0; j < e->width; ++j) {
+        const bool moves = j < model->modes;
+        const vi_mode *mode = &model->mode[moves ? j : 0];
+        e->stiffness[j] = moves ? mode->stiffness : 0.0;
+        e->drag[j] = moves && !model->coupled ? 2.0 * mode->decay : 0.0;
+        e->force[j] = moves ? mode->force : 0.0;
+        e->held[0][j] = moves ? start->held[j] - mode->stiffness * start->q[j] : 0.0;
+        e->held[1][j] = moves ? start->held_rate[j] : 0.0;
     }
-    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
+    set_up_contacts(e, model, start);
 }
 
-/* row += factor * other */
-static inline void add_row(double *restrict row, double factor, const double *restrict other, int width)
-{
-    for (int j = 0; j < width; j += VI_LANES) {
-        for (int i = 0; i < VI_LANES; ++i) {
-            row[j + i] += factor * other[j + i];
-        }
-    }
-}
-
-/* Taylor coefficient n of everything in q'' but the forces of contacts. */
-static void free_load(const equation *restrict e, const vi_drift *drift, double drive, int n, double *restrict load)
-{
-    const vi_structure_model *model = drift->model;
-    const double *restrict x = drift->modal[n], *restrict v = drift->modal[n + 1];
-    const double order = (double)(n + 1);
-    for (int j = 0; j < e->width; j += VI_LANES) {
-        for (int i = 0; i < VI_LANES; ++i) {
-            load[j + i] = drive * e->force[j + i] - e->stiffness[j + i] * x[j + i] - order * (e->drag[j + i] * v[j + i]);
-        }
-    }
-    if (n < 2) {
-        add_row(load, 1.0, e->held[n], e->width);
-    }
-    for (int j = 0; j < model->modes && model->coupled; ++j) {
-        for (int i = 0; i < model->modes; ++i) {
-            load[j] -= model->coupling[j][i] * order * v[i];
-        }
-    }
-}
-
-static void extend_penetrations(vi_drift *drift, const equation *e, const vi_drift_start *start, int n)
+static void extend_penetrations(vi_drift *drift, const equation *e, int n)
 {
     for (int k = 0; k < drift->model->contacts; ++k) {
-        const bool still = start->press[k].kind == VI_PRESS_HOLD;
-        drift->penetration[k][n] = still ? 0.0 : dot(e->toward[k], drift->modal[n], e->width);
+        drift->penetration[k][n] = e->is_held[k] ? 0.0 : vi_row_dot(e->toward[k], drift->modal[n], e->width);
     }
 }
 
 /* ---- forces of contacts ---- */
 
-/* The series of (penetration ^ exponent), each coefficient told as soon as the motion allows: power' d = exponent power d'.
- * Powers are stored backwards, so that a coefficient of a product is the sum of products of two rows. */
-enum { VI_SERIES_ROOM = VI_ORDER + VI_LANES };
-
-typedef struct {
-    double depth[VI_SERIES_ROOM], rate[VI_SERIES_ROOM];   /* coefficient n of d, and n times it */
-    double behind[VI_SERIES_ROOM], turned[VI_SERIES_ROOM]; /* coefficient n of the power, at [VI_ORDER - n], and n times it */
-    double power;                                          /* its coefficient that is needed next */
-} power_series;
-
-static void start_power(power_series *p, const vi_press *press, double depth)
-{
-    memset(p, 0, sizeof *p);
-    p->depth[0] = depth;
-    p->power = p->behind[VI_ORDER] = pow(depth, press->exponent);
-}
-
 /* Coefficient n of the force of a power law; coefficient n + 1 of d is known. */
-static double pressed_by_power(power_series *p, const vi_press *press, const double d[], int n)
+static double pressed_by_power(vi_power_series *depth, const vi_press *press, const double d[], int n)
 {
-    const double order = (double)(n + 1), power = p->power;
-    const int width = whole_lanes(n + 2), last = VI_ORDER - 1 - n;
-    p->depth[n + 1] = d[n + 1];
-    p->rate[n + 1] = order * d[n + 1];
-    const double drag = dot(p->rate, &p->behind[last], width); /* of power d' */
-    const double turn = press->exponent * drag - dot(p->depth, &p->turned[last], width);
-    p->power = p->behind[last] = turn * (1.0 / (order * d[0]));
-    p->turned[last] = order * p->power;
+    const double power = depth->power, drag = vi_power_series_extend(depth, d[n + 1]);
     return press->stiffness * (power + press->damping * drag);
 }
 
@@ -163,39 +105,91 @@ static double pressed_by_line(const vi_press *press, const double d[], int n)
     return (n == 0 ? press->constant : 0.0) + press->stiffness * d[n] + press->damping * rate;
 }
 
-/* What the contacts that yield add to coefficient n of the load. */
-static void press(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, power_series power[],
-                  double *restrict load)
+/* Coefficient n of the forces of the contacts that yield. */
+static void press(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, vi_power_series power[])
 {
-    for (int k = 0; k < drift->model->contacts; ++k) {
+    for (int i = 0; i < e->yielding; ++i) {
+        const int k = e->yields[i];
         const vi_press *law = &start->press[k];
-        if (law->kind == VI_PRESS_LINEAR || law->kind == VI_PRESS_POWER) {
-            const double *d = drift->penetration[k];
-            drift->force[k][n] = law->kind == VI_PRESS_LINEAR ? pressed_by_line(law, d, n)
-                                                              : pressed_by_power(&power[k], law, d, n);
-            add_row(load, -drift->force[k][n], e->toward[k], e->width);
+        const double *d = drift->penetration[k];
+        drift->force[k][n] = law->kind == VI_PRESS_LINEAR ? pressed_by_line(law, d, n)
+                                                          : pressed_by_power(&power[k], law, d, n);
+    }
+}
+
+/* ---- the next coefficient of the motion ---- */
+
+/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The numbers of
+ * contacts, and of those that yield, are constants where there is one. */
+static inline void extend_beside(vi_drift *drift, const equation *restrict e, double drive, int n, double share,
+                                 int contacts, int yielding)
+{
+    const double *restrict x = drift->modal[n], *restrict v = drift->modal[n + 1];
+    double *restrict next = drift->modal[n + 2], sum[VI_PORTS][VI_LANES];
+    const double order = (double)(n + 1);
+    for (int k = 0; k < contacts; ++k) {
+        sum[k][0] = sum[k][1] = 0.0;
+    }
+    for (int j = 0; j < e->width; j += VI_LANES) {
+        double load[VI_LANES];
+        for (int i = 0; i < VI_LANES; ++i) {
+            load[i] = drive * e->force[j + i] - e->stiffness[j + i] * x[j + i] - order * (e->drag[j + i] * v[j + i]);
         }
+        for (int y = 0; y < yielding; ++y) {
+            const double *restrict toward = &e->toward[e->yields[y]][j], force = drift->force[e->yields[y]][n];
+            for (int i = 0; i < VI_LANES; ++i) {
+                load[i] -= force * toward[i];
+            }
+        }
+        for (int i = 0; i < VI_LANES; ++i) {
+            next[j + i] = share * load[i];
+        }
+        for (int k = 0; k < contacts; ++k) {
+            for (int i = 0; i < VI_LANES; ++i) {
+                sum[k][i] += e->toward[k][j + i] * next[j + i];
+            }
+        }
+    }
+    for (int k = 0; k < contacts; ++k) {
+        drift->penetration[k][n + 2] = sum[k][0] + sum[k][1];
+    }
+}
+
+static void extend(vi_drift *drift, const equation *e, double drive, int n, double share)
+{
+    if (drift->model->contacts == 1 && e->yielding == 1) {
+        extend_beside(drift, e, drive, n, share, 1, 1);
+    } else {
+        extend_beside(drift, e, drive, n, share, drift->model->contacts, e->yielding);
+    }
+}
+
+/* The damping that couples the modes. */
+static void drag(vi_drift *drift, int n, double share)
+{
+    const vi_structure_model *model = drift->model;
+    const double order = (double)(n + 1);
+    for (int j = 0; j < model->modes; ++j) {
+        drift->modal[n + 2][j] -= share * order * vi_structure_at(model, model->coupling[j], drift->modal[n + 1]);
     }
 }
 
 /* The forces that keep the held contacts at rest: shape_k . q'' = 0 for each of them. */
-static void hold(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, double *restrict load)
+static void hold(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, double share)
 {
     const vi_structure_model *model = drift->model;
-    double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, f[VI_PORTS];
-    int held[VI_PORTS] = {0};
+    double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, f[VI_PORTS], *next = drift->modal[n + 2];
     for (int k = 0; k < model->contacts; ++k) {
-        held[k] = start->press[k].kind == VI_PRESS_HOLD;
         for (int l = 0; l < model->contacts; ++l) {
             g[k][l] = start->sign[k] * start->sign[l] * model->compliance[k][l];
         }
-        b[k] = held[k] ? dot(e->toward[k], load, e->width) : 0.0;
+        b[k] = e->is_held[k] ? vi_row_dot(e->toward[k], next, e->width) : 0.0;
     }
-    vi_solve_active(model->contacts, g, b, held, f);
+    vi_solve_active(model->contacts, g, b, e->is_held, f);
     for (int k = 0; k < model->contacts; ++k) {
-        if (held[k]) {
-            drift->force[k][n] = f[k];
-            add_row(load, -f[k], e->toward[k], e->width);
+        if (e->is_held[k]) {
+            drift->force[k][n] = f[k] / share;
+            vi_row_add(next, -f[k], e->toward[k], e->width);
         }
     }
 }
@@ -218,6 +212,30 @@ static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
         }
         drift->force_scale[k] = size / fabs(model->mobility[k][k]);
     }
+}
+
+/* The largest modulus of a row. */
+static double largest(const double row[], int width)
+{
+    double most = 0.0;
+    for (int j = 0; j < width; ++j) {
+        most = vi_max(most, fabs(row[j]));
+    }
+    return most;
+}
+
+/* Length of the segment times its fastest rate. */
+static double reach(const vi_drift *drift, const equation *e, double fastest)
+{
+    const double first = largest(drift->modal[1], e->width), second = largest(drift->modal[2], e->width);
+    const double last = largest(drift->modal[VI_ORDER], e->width), before = largest(drift->modal[VI_ORDER - 1], e->width);
+    for (size_t i = 0; i < sizeof REACHES / sizeof *REACHES; ++i) {
+        const double u = REACHES[i] / fastest, u2 = u * u, u4 = u2 * u2, u8 = u4 * u4;
+        if (u8 * u8 * u8 * (before + last * u) <= NEGLIGIBLE * vi_max(first, second * u)) {
+            return REACHES[i];
+        }
+    }
+    return REACH;
 }
 
 /* A power law's own length: up to where its last terms are below the tolerance. */
@@ -255,7 +273,7 @@ static void end_series(vi_drift *drift, int order)
 }
 
 /* Has a power law's series grown too steep to be continued beyond coefficient n + 2? */
-static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, const power_series power[])
+static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, const vi_power_series power[])
 {
     for (int k = 0; k < drift->model->contacts; ++k) {
         if (start->press[k].kind == VI_PRESS_POWER
@@ -266,17 +284,7 @@ static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n,
     return false;
 }
 
-static bool presses(const vi_drift_start *start, const vi_structure_model *model, vi_press_kind kind)
-{
-    for (int k = 0; k < model->contacts; ++k) {
-        if (start->press[k].kind == kind) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static void start_series(vi_drift *drift, const equation *e, const vi_drift_start *start, power_series power[])
+static void start_series(vi_drift *drift, const equation *e, const vi_drift_start *start, vi_power_series power[])
 {
     const vi_structure_model *model = drift->model;
     memset(drift->force, 0, (size_t)model->contacts * sizeof drift->force[0]);
@@ -284,38 +292,42 @@ static void start_series(vi_drift *drift, const equation *e, const vi_drift_star
         drift->modal[0][j] = 0.0;
         drift->modal[1][j] = j < model->modes ? start->p[j] : 0.0;
     }
-    extend_penetrations(drift, e, start, 1);
+    extend_penetrations(drift, e, 1);
     for (int k = 0; k < model->contacts; ++k) {
         drift->penetration[k][0] = start->penetration[k];
         if (start->press[k].kind == VI_PRESS_POWER) {
-            start_power(&power[k], &start->press[k], start->penetration[k]);
+            vi_power_series_begin(&power[k], start->press[k].exponent, start->penetration[k]);
         }
     }
 }
 
 void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, double length)
 {
-    double load[VI_ROW];
-    power_series power[VI_PORTS];
+    vi_power_series power[VI_PORTS];
     equation e;
     const double w = model->clock.angular_frequency;
     double drive[2] = {start->cosine, -w * start->sine};
-    const bool any_held = presses(start, model, VI_PRESS_HOLD);
     drift->model = model;
     drift->order = VI_ORDER;
+    drift->rooted = 0;
     set_up(&e, model, start);
     start_series(drift, &e, start, power);
     for (int n = 0; n + 2 <= VI_ORDER; ++n) {
         const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
-        free_load(&e, drift, drive[0], n, load);
-        press(drift, &e, start, n, power, load);
-        if (any_held) {
-            hold(drift, &e, start, n, load);
+        press(drift, &e, start, n, power);
+        extend(drift, &e, drive[0], n, share);
+        if (n < 2) {
+            vi_row_add(drift->modal[n + 2], share, e.held[n], e.width);
         }
-        for (int j = 0; j < e.width; ++j) {
-            drift->modal[n + 2][j] = share * load[j];
+        if (model->coupled) {
+            drag(drift, n, share);
         }
-        extend_penetrations(drift, &e, start, n + 2);
+        if (e.any_held) {
+            hold(drift, &e, start, n, share);
+        }
+        if (n < 2 || model->coupled || e.any_held) {
+            extend_penetrations(drift, &e, n + 2);
+        }
         drive[0] = drive[1];
         drive[1] = next;
         if (too_steep(drift, start, n, power)) {
@@ -325,28 +337,39 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
     }
     scale_of_holding(drift, start);
     const double fastest = fastest_rate(model, start);
-    drift->length = fastest > 0.0 ? vi_min(length, REACH / fastest) : length;
+    drift->length = fastest > 0.0 ? vi_min(length, reach(drift, &e, fastest) / fastest) : length;
     shorten(drift, start);
 }
 
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[])
 {
-    const int modes = drift->model->modes;
+    const int modes = drift->model->modes, least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
+    const double r = vi_drift_variable(drift, u);
     for (int j = 0; j < modes; j += VI_LANES) {
         double x[VI_LANES], v[VI_LANES] = {0.0};
         memcpy(x, &drift->modal[VI_ORDER][j], sizeof x);
-        for (int n = VI_ORDER - 1; n >= 0; --n) {
+        for (int n = VI_ORDER - 1; n >= least; --n) {
             const double *c = &drift->modal[n][j];
             for (int i = 0; i < VI_LANES; ++i) {
-                v[i] = v[i] * u + x[i];
-                x[i] = x[i] * u + c[i];
+                v[i] = v[i] * r + x[i];
+                x[i] = x[i] * r + c[i];
             }
         }
         for (int i = 0; i < VI_LANES && j + i < modes; ++i) {
-            q_end[j + i] = q[j + i] + x[i];
-            p_end[j + i] = v[i];
+            q_end[j + i] = q[j + i] + (drift->rooted ? u * x[i] : x[i]);
+            p_end[j + i] = drift->rooted ? x[i] + 0.5 * r * v[i] : v[i];
         }
     }
+}
+
+double vi_drift_impulse(const vi_drift *drift, int k, double u)
+{
+    const double r = vi_drift_variable(drift, u), step = drift->rooted ? 2.0 : 1.0;
+    double sum = 0.0;
+    for (int n = VI_ORDER; n >= 0; --n) {
+        sum = sum * r + drift->force[k][n] / ((double)n / step + 1.0);
+    }
+    return sum * u;
 }
 
 void vi_drift_point(const vi_drift *drift, const double shape[], double polynomial[VI_ORDER + 1])
