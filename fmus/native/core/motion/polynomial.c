@@ -29,9 +29,9 @@ void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
 }
 
 /* n (n - 1) (n - 2) (n - 3): what the fourth derivative makes of the n-th power. */
-static const double FOURTH[VI_ORDER + 1] = {0.0,      0.0,      0.0,      0.0,      24.0,     120.0,    360.0,
-                                            840.0,    1680.0,   3024.0,   5040.0,   7920.0,   11880.0,  17160.0,
-                                            24024.0,  32760.0,  43680.0,  57120.0,  73440.0,  93024.0,  116280.0,
+static const double FOURTH[VI_ORDER + 1] = {0.0,      0.0,      0.0,      0.0,      24.0,     120.0,   360.0,
+                                            840.0,    1680.0,   3024.0,   5040.0,   7920.0,   11880.0, 17160.0,
+                                            24024.0,  32760.0,  43680.0,  57120.0,  73440.0,  93024.0, 116280.0,
                                             143640.0, 175560.0, 212520.0, 255024.0, 303600.0, 358800.0};
 
 /* Largest modulus of the fourth derivative over 0 <= u <= length. */

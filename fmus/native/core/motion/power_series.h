@@ -18,8 +18,8 @@ typedef struct {
     double exponent;
     int order;                                        /* coefficients 0 to `order` of the power are known */
     double base[VI_POWER_ROOM], slope[VI_POWER_ROOM]; /* coefficient n of the base, and n times it; from 1 on */
-    double behind[VI_POWER_ROOM];                     /* coefficient n of the power, at [VI_ORDER - n] */
-    double first, power;                              /* coefficient 0 of the base, coefficient `order` of the power */
+    double behind[VI_POWER_ROOM];                     /* coefficient n of the power, at [VI_ORDER - n]; all but the last */
+    double base_first, first, power; /* coefficient 0 of the base and of the power, coefficient `order` of the power */
 } vi_power_series;
 
 /* Begin with coefficient 0 of the base, > 0. */
@@ -27,28 +27,30 @@ static inline void vi_power_series_begin(vi_power_series *p, double exponent, do
 {
     memset(p, 0, sizeof *p);
     p->exponent = exponent;
-    p->first = first;
-    p->power = p->behind[VI_ORDER] = pow(first, exponent);
+    p->base_first = first;
+    p->first = p->power = pow(first, exponent);
 }
 
 /* One order more, from the next coefficient of the base. Returns the coefficient of power base' that is known by now: the
- * one before the new order. */
+ * one before the new order. The newest numbers are added last and stored afterwards: no sum waits for them. */
 static inline double vi_power_series_extend(vi_power_series *p, double next)
 {
-    const int n = ++p->order, width = VI_WHOLE_LANES(n + 1);
-    const double order = (double)n;
+    const int n = ++p->order, width = VI_WHOLE_LANES(n);
+    const double order = (double)n, slope = order * next, last = n > 1 ? p->power : 0.0;
     double product[VI_LANES] = {0.0}, rest[VI_LANES] = {0.0}, *behind = &p->behind[VI_ORDER - n];
-    p->base[n] = next;
-    p->slope[n] = order * next;
     for (int j = 0; j < width; j += VI_LANES) {
         for (int i = 0; i < VI_LANES; ++i) {
             product[i] += p->slope[j + i] * behind[j + i];
             rest[i] += p->base[j + i] * behind[j + i];
         }
     }
-    const double slope = product[0] + product[1];
-    p->power = behind[0] = ((p->exponent + 1.0) * slope - order * (rest[0] + rest[1])) * (1.0 / (order * p->first));
-    return slope;
+    const double along = (product[0] + product[1]) + p->slope[1] * last + slope * p->first;
+    const double across = (rest[0] + rest[1]) + p->base[1] * last + next * p->first;
+    behind[1] = p->power;
+    p->base[n] = next;
+    p->slope[n] = slope;
+    p->power = ((p->exponent + 1.0) * along - order * across) * (1.0 / (order * p->base_first));
+    return along;
 }
 
 #endif

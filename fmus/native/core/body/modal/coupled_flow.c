@@ -49,16 +49,18 @@ typedef struct {
     double held[2][VI_ROW];                                /* constant load at the start, and its slope */
     double toward[VI_PORTS][VI_ROW];                       /* shapes, towards the stops */
     int yields[VI_PORTS], yielding;                        /* the contacts that yield, and how many */
-    int is_held[VI_PORTS], any_held;
+    double compliance[VI_PORTS][VI_PORTS];                 /* of each contact, towards its stop, to their forces */
+    int is_held[VI_PORTS], any_held, any_power;
 } equation;
 
 static void set_up_contacts(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
-    e->yielding = e->any_held = 0;
+    e->yielding = e->any_held = e->any_power = 0;
     for (int k = 0; k < model->contacts; ++k) {
         const vi_press_kind kind = start->press[k].kind;
         e->is_held[k] = kind == VI_PRESS_HOLD;
         e->any_held |= e->is_held[k];
+        e->any_power |= kind == VI_PRESS_POWER;
         if (kind == VI_PRESS_LINEAR || kind == VI_PRESS_POWER) {
             e->yields[e->yielding++] = k;
         }
@@ -81,6 +83,11 @@ static void set_up(equation *e, const vi_structure_model *model, const vi_drift_
         e->held[1][j] = moves ? start->held_rate[j] : 0.0;
     }
     set_up_contacts(e, model, start);
+    for (int k = 0; k < model->contacts; ++k) {
+        for (int y = 0; y < e->yielding; ++y) {
+            e->compliance[k][y] = start->sign[k] * start->sign[e->yields[y]] * model->compliance[k][e->yields[y]];
+        }
+    }
 }
 
 static void extend_penetrations(vi_drift *drift, const equation *e, int n)
@@ -119,8 +126,9 @@ static void press(vi_drift *drift, const equation *e, const vi_drift_start *star
 
 /* ---- the next coefficient of the motion ---- */
 
-/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The numbers of
- * contacts, and of those that yield, are constants where there is one. */
+/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The
+ * numbers of contacts, and of those that yield, are constants where there is one. The contacts do not wait for the modes:
+ * what the forces do to them is known from the compliances. */
 static inline void extend_beside(vi_drift *drift, const equation *restrict e, double drive, int n, double share,
                                  int contacts, int yielding)
 {
@@ -135,6 +143,11 @@ static inline void extend_beside(vi_drift *drift, const equation *restrict e, do
         for (int i = 0; i < VI_LANES; ++i) {
             load[i] = drive * e->force[j + i] - e->stiffness[j + i] * x[j + i] - order * (e->drag[j + i] * v[j + i]);
         }
+        for (int k = 0; k < contacts; ++k) {
+            for (int i = 0; i < VI_LANES; ++i) {
+                sum[k][i] += e->toward[k][j + i] * load[i];
+            }
+        }
         for (int y = 0; y < yielding; ++y) {
             const double *restrict toward = &e->toward[e->yields[y]][j], force = drift->force[e->yields[y]][n];
             for (int i = 0; i < VI_LANES; ++i) {
@@ -144,14 +157,13 @@ static inline void extend_beside(vi_drift *drift, const equation *restrict e, do
         for (int i = 0; i < VI_LANES; ++i) {
             next[j + i] = share * load[i];
         }
-        for (int k = 0; k < contacts; ++k) {
-            for (int i = 0; i < VI_LANES; ++i) {
-                sum[k][i] += e->toward[k][j + i] * next[j + i];
-            }
-        }
     }
     for (int k = 0; k < contacts; ++k) {
-        drift->penetration[k][n + 2] = sum[k][0] + sum[k][1];
+        double all = sum[k][0] + sum[k][1];
+        for (int y = 0; y < yielding; ++y) {
+            all -= e->compliance[k][y] * drift->force[e->yields[y]][n];
+        }
+        drift->penetration[k][n + 2] = share * all;
     }
 }
 
@@ -228,7 +240,8 @@ static double largest(const double row[], int width)
 static double reach(const vi_drift *drift, const equation *e, double fastest)
 {
     const double first = largest(drift->modal[1], e->width), second = largest(drift->modal[2], e->width);
-    const double last = largest(drift->modal[VI_ORDER], e->width), before = largest(drift->modal[VI_ORDER - 1], e->width);
+    const double last = largest(drift->modal[VI_ORDER], e->width),
+                 before = largest(drift->modal[VI_ORDER - 1], e->width);
     for (size_t i = 0; i < sizeof REACHES / sizeof *REACHES; ++i) {
         const double u = REACHES[i] / fastest, u2 = u * u, u4 = u2 * u2, u8 = u4 * u4;
         if (u8 * u8 * u8 * (before + last * u) <= NEGLIGIBLE * vi_max(first, second * u)) {
@@ -277,7 +290,8 @@ static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n,
 {
     for (int k = 0; k < drift->model->contacts; ++k) {
         if (start->press[k].kind == VI_PRESS_POWER
-            && !(fabs(drift->penetration[k][n + 2]) < LARGEST_COEFFICIENT && fabs(power[k].power) < LARGEST_COEFFICIENT)) {
+            && !(fabs(drift->penetration[k][n + 2]) < LARGEST_COEFFICIENT
+                 && fabs(power[k].power) < LARGEST_COEFFICIENT)) {
             return true;
         }
     }
@@ -330,7 +344,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
         }
         drive[0] = drive[1];
         drive[1] = next;
-        if (too_steep(drift, start, n, power)) {
+        if (e.any_power && too_steep(drift, start, n, power)) {
             end_series(drift, n + 1);
             break;
         }

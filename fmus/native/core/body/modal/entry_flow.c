@@ -24,7 +24,7 @@ static double force(entry *at, const double d[], int n)
 {
     const vi_press *press = &at->start->press[at->contact];
     const int order = n - at->shift;
-    double drag = at->power.power * at->power.first;
+    double drag = at->power.power * at->power.base_first;
     if (order < 0) {
         return 0.0;
     }
@@ -44,13 +44,15 @@ static void extend(vi_drift *drift, const entry *at, double drive, int n)
     const double share = 4.0 / ((double)(n + 4) * (double)(n + 2));
     for (int j = 0; j < model->modes; ++j) {
         const vi_mode *mode = &model->mode[j];
-        double load = drive * mode->force - mode->stiffness * x[j] - rate * (2.0 * mode->decay * v[j]) - shape[j] * push;
+        double load = drive * mode->force - mode->stiffness * x[j] - rate * (2.0 * mode->decay * v[j])
+                      - shape[j] * push;
         load += n == 0 ? at->start->held[j] - mode->stiffness * at->start->q[j] : 0.0;
         load += n == 2 ? at->start->held_rate[j] : 0.0;
         drift->modal[n + 4][j] = share * load;
     }
     for (int k = 0; k < model->contacts; ++k) {
-        drift->penetration[k][n + 4] = at->start->sign[k] * vi_structure_at(model, model->shape[k], drift->modal[n + 4]);
+        drift->penetration[k][n + 4] = at->start->sign[k]
+                                       * vi_structure_at(model, model->shape[k], drift->modal[n + 4]);
     }
 }
 
@@ -103,8 +105,7 @@ static double reach(const vi_drift *drift, const entry *at)
     return r;
 }
 
-bool vi_entry_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, int k,
-                    double length)
+bool vi_entry_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, int k, double length)
 {
     const double doubled = 2.0 * start->press[k].exponent, w = model->clock.angular_frequency;
     double drive[2] = {start->cosine, -w * start->sine};

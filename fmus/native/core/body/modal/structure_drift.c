@@ -31,7 +31,7 @@ static bool coasts(const vi_structure *s, int k, double depth, double rate)
 
 static void look(const vi_structure *s, vi_situation *now)
 {
-    now->any_thin = false;
+    now->any_thin = now->any_acceleration = false;
     now->length = HUGE_VAL;
     vi_structure_held_now(s, now->held);
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -50,57 +50,62 @@ static void look(const vi_structure *s, vi_situation *now)
     }
 }
 
-/* Is a power law pressed in deeper than any thin contact, whose time is a radian at most? */
-static bool is_deep(const vi_structure *s, const vi_situation *now, int k, double rate)
+/* Depth that is no more than rounding, of contact k. */
+static double shallow_depth(const vi_structure *s, int k)
 {
-    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0, depth = now->at[k];
-    double thickest = -rate * radian;
-    if (rate > 0.0) {
-        const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration);
-        thickest = ENTRY * (rate + 0.5 * fabs(a) * radian) * radian;
-    }
-    return depth > thickest && depth > SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+    return SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+}
+
+/* Is a power law pressed in deeper than any thin contact, whose time is a radian at most? */
+static bool is_deep(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration)
+{
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
+    const double thickest = rate > 0.0 ? ENTRY * (rate + 0.5 * fabs(acceleration) * radian) * radian : -rate * radian;
+    return now->at[k] > thickest && now->at[k] > shallow_depth(s, k);
 }
 
 /* Is power law k thin? For how long at most? */
-static bool is_thin(const vi_structure *s, const vi_situation *now, int k, double rate, double *time)
+static bool is_thin(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration,
+                    double *time)
 {
-    const double depth = vi_max(0.0, now->at[k]);
-    const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration);
-    *time = vi_thin_time(s, k, rate, now->acceleration);
+    const double depth = vi_max(0.0, now->at[k]), shallow = shallow_depth(s, k);
+    *time = vi_thin_time(s, k, rate, now->acceleration, rate < 0.0 && depth > shallow ? -depth / rate : 0.0);
     /* the way in: as far as its series would need steps much shorter than this one */
-    const double reached = (rate + 0.5 * vi_max(0.0, vi_structure_direction(s, k) * a) * *time) * *time;
-    const double shallow = SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+    const double reached = (rate + 0.5 * vi_max(0.0, acceleration) * *time) * *time;
     const double entered = vi_max(ENTRY * reached, shallow);
     const double left = vi_max(-rate * *time, coasts(s, k, depth, rate) ? shallow : 0.0);
     return rate <= 0.0 ? depth <= left || depth == 0.0 : depth <= entered;
 }
 
+static void look_at_power(const vi_structure *s, vi_situation *now, int k, double rate)
+{
+    double force[VI_PORTS], time;
+    if (!now->any_acceleration) {
+        vi_structure_accelerate(s, now->acceleration, force);
+        now->any_acceleration = true;
+    }
+    const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration) * vi_structure_direction(s, k);
+    if (!is_deep(s, now, k, rate, a) && is_thin(s, now, k, rate, a, &time)) {
+        now->thin[k] = 1;
+        now->any_thin = true;
+        now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
+        now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
+    }
+}
+
 /* Which power laws are thin, and how far the others' series may go. */
 static void look_at_powers(const vi_structure *s, vi_situation *now)
 {
-    double force[VI_PORTS], time;
-    bool any_power = false;
     for (int k = 0; k < s->model->contacts; ++k) {
-        any_power = any_power || now->press[k].kind == VI_PRESS_POWER;
-    }
-    if (!any_power) {
-        return;
-    }
-    vi_structure_accelerate(s, now->acceleration, force);
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (now->press[k].kind != VI_PRESS_POWER) {
-            continue;
-        }
-        const double rate = vi_structure_approach(s, k);
-        if (!is_deep(s, now, k, rate) && is_thin(s, now, k, rate, &time)) {
-            now->thin[k] = 1;
-            now->any_thin = true;
-            now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
-            now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
-        } else if (rate < 0.0) {
-            /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
-            now->length = vi_min(now->length, -now->at[k] / rate);
+        if (now->press[k].kind == VI_PRESS_POWER) {
+            const double rate = vi_structure_approach(s, k);
+            if (rate > 0.0 || !is_deep(s, now, k, rate, 0.0)) {
+                look_at_power(s, now, k, rate);
+            }
+            if (rate < 0.0 && !now->thin[k]) {
+                /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
+                now->length = vi_min(now->length, -now->at[k] / rate);
+            }
         }
     }
 }
@@ -115,7 +120,8 @@ static int entering(const vi_structure *s, const vi_situation *now)
             && now->press[k].kind == VI_PRESS_POWER && found < 0 && vi_structure_approach(s, k) > 0.0) {
             found = k;
         } else if (s->state->status[k] != VI_CONTACT_FREE
-                   || -now->at[k] <= VI_ROUNDING * vi_structure_displacement_size(s, k)) {
+                   || (vi_structure_watched(s, k)
+                       && -now->at[k] <= VI_ROUNDING * vi_structure_displacement_size(s, k))) {
             return -1;
         }
     }
@@ -123,7 +129,8 @@ static int entering(const vi_structure *s, const vi_situation *now)
 }
 
 /* Follow the beginning of a contact, where that goes further in than rounding. */
-static bool enter(const vi_structure *s, const vi_situation *now, const vi_drift_start *start, double length, vi_drift *drift)
+static bool enter(const vi_structure *s, const vi_situation *now, const vi_drift_start *start, double length,
+                  vi_drift *drift)
 {
     double depth[4];
     const int k = entering(s, now);
@@ -131,7 +138,7 @@ static bool enter(const vi_structure *s, const vi_situation *now, const vi_drift
         return false;
     }
     vi_polynomial_at(drift->penetration[k], sqrt(drift->length), depth);
-    return depth[0] > SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+    return depth[0] > shallow_depth(s, k);
 }
 
 /* ---- one segment ---- */

@@ -201,8 +201,7 @@ static void pressing(const vi_situation *now, int k, const double depth[VI_ORDER
 }
 
 /* Where a contact that has just begun might end: depth = r^2 e(r), whose rate is e + r e' / 2. */
-static void ends_of_entry(const vi_drift *drift, const vi_situation *now, int k, double length,
-                          vi_event_found *first)
+static void ends_of_entry(const vi_drift *drift, const vi_situation *now, int k, double length, vi_event_found *first)
 {
     double depth[VI_ORDER + 1], sense[VI_ORDER + 1];
     memcpy(depth, drift->penetration[k], sizeof depth);
