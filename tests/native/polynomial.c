@@ -72,6 +72,7 @@ static void nothing_is_passed(uint64_t *seed)
         const double noise = 4.0 * DBL_EPSILON * vi_polynomial_size(c, length);
         const vi_fall fall = vi_polynomial_fall(c, 0.0, length, noise);
         CHECK(isfinite(fall.time) && fall.time >= 0.0 && fall.time <= length, "run %d: %.17g", run, fall.time);
+        CHECK(!vi_polynomial_clears(c, length) || !fall.found, "run %d: a zero at %.17g", run, fall.time);
         for (int i = 1; i < 200; ++i) {
             vi_polynomial_at(c, fall.time * (double)i / 200.0, value);
             CHECK(value[0] >= -4.0 * noise, "run %d: %g at step %d of 200", run, value[0], i);

@@ -28,15 +28,30 @@ void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
     value[3] = 6.0 * j;
 }
 
+/* n (n - 1) (n - 2) (n - 3): what the fourth derivative makes of the n-th power. */
+static const double FOURTH[VI_ORDER + 1] = {0.0,      0.0,      0.0,      0.0,      24.0,     120.0,   360.0,
+                                            840.0,    1680.0,   3024.0,   5040.0,   7920.0,   11880.0, 17160.0,
+                                            24024.0,  32760.0,  43680.0,  57120.0,  73440.0,  93024.0, 116280.0,
+                                            143640.0, 175560.0, 212520.0, 255024.0, 303600.0, 358800.0};
+
 /* Largest modulus of the fourth derivative over 0 <= u <= length. */
 static double largest_snap(const double c[VI_ORDER + 1], double length)
 {
     double snap = 0.0;
     for (int n = VI_ORDER; n >= 4; --n) {
-        const double k = (double)n;
-        snap = snap * length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
+        snap = snap * length + FOURTH[n] * fabs(c[n]);
     }
     return snap;
+}
+
+bool vi_polynomial_clears(const double c[VI_ORDER + 1], double length)
+{
+    double least = c[0], power = 1.0;
+    for (int n = 1; n <= VI_ORDER; ++n) {
+        power *= length;
+        least += vi_min(0.0, c[n] * power);
+    }
+    return least > 0.0;
 }
 
 double vi_polynomial_size(const double c[VI_ORDER + 1], double length)
@@ -67,8 +82,10 @@ vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double len
     double u = from, reach = length, last = length, bound = largest_snap(c, length);
     int crawl = 0;
     for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
-        double value[4];
-        vi_polynomial_at(c, u, value);
+        double value[4] = {c[0], c[1], 2.0 * c[2], 6.0 * c[3]};
+        if (u != 0.0) {
+            vi_polynomial_at(c, u, value);
+        }
         vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
         if (p.velocity > 0.0 && p.clearance <= noise) {
             return land(c, u, &p, length, noise);

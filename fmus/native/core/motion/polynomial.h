@@ -13,6 +13,9 @@ void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4]);
 /* Sum of the moduli of the terms at `length`: their rounding is 1e-16 of this. */
 double vi_polynomial_size(const double c[VI_ORDER + 1], double length);
 
+/* Is it certain, from the sizes of the terms alone, that the polynomial stays positive over 0 <= u <= length? Most do. */
+bool vi_polynomial_clears(const double c[VI_ORDER + 1], double length);
+
 typedef struct {
     bool found;
     double time;  /* s; not found: there is none up to here, the length or the end of a long search */

@@ -6,122 +6,207 @@
 
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
+#include "motion/power_series.h"
 
-/* Length of a segment times the fastest rate: the first term left out is below 1e-17 of the motion, and the largest
- * terms are 12 times it. While a stop yields, less: its contact is short anyway, and keeps all digits. */
-static const double REACH = 2.5, REACH_YIELDING = 1.0;
+/* Length of a segment times the fastest rate: of any motion the first term left out is below 1e-17 of it, and the largest
+ * terms are 12 times it. Where the fast modes move little, longer: the first of these for which the last terms are this
+ * small beside the first. What is left out is less than half of the last term up to the longest. */
+static const double REACH = 2.5, REACHES[] = {5.0, 4.25, 3.6, 3.0};
+static const double NEGLIGIBLE = 1e-18;
 /* Of a power law the terms must fall by this over a segment: it has a singularity where the contact ends. */
 static const double SMALLEST_TERM = 0.01;
 /* In the first instants of a power law coefficient n is of size (rate / penetration)^n: the series ends before a
  * product of two of them overflows. */
 static const double LARGEST_COEFFICIENT = 1e140;
 
-/* Rate that no motion of the system exceeds, rad/s. */
+/* Rate at which the Taylor coefficients of no motion grow faster, rad/s. */
 static double fastest_rate(const vi_structure_model *model, const vi_drift_start *start)
 {
-    double stiffness = 0.0, damping = 0.0;
+    double stiffness = 0.0, damping = 0.0, drag = model->coupled ? model->fastest : 0.0;
     for (int k = 0; k < model->contacts; ++k) {
         const vi_press *press = &start->press[k];
-        const double mobility = fabs(model->mobility[k][k]);
         if (press->kind == VI_PRESS_LINEAR) {
-            stiffness += fabs(press->stiffness) * mobility;
-            damping += fabs(press->damping) * mobility;
+            stiffness += fabs(press->stiffness) * model->compliance[k][k];
+            damping += fabs(press->damping) * model->compliance[k][k];
         }
     }
-    return model->fastest + sqrt(stiffness) + damping;
-}
-
-static double at_contact(const vi_structure_model *model, int k, const double vector[])
-{
-    return vi_structure_at(model, model->shape[k], vector);
-}
-
-/* Coefficient n of (penetration ^ exponent): the power-series recurrence of p d = exponent p d'. */
-static void extend_power(const double d[], double exponent, int n, double power[])
-{
-    if (n == 0) {
-        power[0] = pow(d[0], exponent);
-        return;
+    if (stiffness == 0.0 && damping == 0.0) {
+        return model->fastest;
     }
-    double sum = 0.0;
-    for (int i = 1; i <= n; ++i) {
-        sum += (exponent * (double)i - (double)(n - i)) * d[i] * power[n - i];
+    for (int j = 0; j < model->modes && !model->coupled; ++j) {
+        drag = vi_max(drag, 2.0 * model->mode[j].decay);
     }
-    power[n] = sum / ((double)n * d[0]);
+    const double decay = 0.5 * (drag + damping);
+    return decay + sqrt(decay * decay + model->fastest * model->fastest + stiffness);
 }
 
-static double pressed(const vi_drift *drift, int k, const vi_press *press, int n, double power[])
+/* ---- rows of modes ---- */
+
+/* The equation of the modes; its rows end with modes that do not move. */
+typedef struct {
+    int width;                                             /* of the rows in use */
+    double stiffness[VI_ROW], drag[VI_ROW], force[VI_ROW]; /* drag: 0 where the damping couples the modes */
+    double held[2][VI_ROW];                                /* constant load at the start, and its slope */
+    double toward[VI_PORTS][VI_ROW];                       /* shapes, towards the stops */
+    int yields[VI_PORTS], yielding;                        /* the contacts that yield, and how many */
+    double compliance[VI_PORTS][VI_PORTS];                 /* of each contact, towards its stop, to their forces */
+    int is_held[VI_PORTS], any_held, any_power;
+} equation;
+
+static void set_up_contacts(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
-    const double *d = drift->penetration[k];
+    e->yielding = e->any_held = e->any_power = 0;
+    for (int k = 0; k < model->contacts; ++k) {
+        const vi_press_kind kind = start->press[k].kind;
+        e->is_held[k] = kind == VI_PRESS_HOLD;
+        e->any_held |= e->is_held[k];
+        e->any_power |= kind == VI_PRESS_POWER;
+        if (kind == VI_PRESS_LINEAR || kind == VI_PRESS_POWER) {
+            e->yields[e->yielding++] = k;
+        }
+        for (int j = 0; j < e->width; ++j) {
+            e->toward[k][j] = j < model->modes ? start->sign[k] * model->shape[k][j] : 0.0;
+        }
+    }
+}
+
+static void set_up(equation *e, const vi_structure_model *model, const vi_drift_start *start)
+{
+    e->width = VI_WHOLE_LANES(model->modes);
+    for (int j = 0; j < e->width; ++j) {
+        const bool moves = j < model->modes;
+        const vi_mode *mode = &model->mode[moves ? j : 0];
+        e->stiffness[j] = moves ? mode->stiffness : 0.0;
+        e->drag[j] = moves && !model->coupled ? 2.0 * mode->decay : 0.0;
+        e->force[j] = moves ? mode->force : 0.0;
+        e->held[0][j] = moves ? start->held[j] - mode->stiffness * start->q[j] : 0.0;
+        e->held[1][j] = moves ? start->held_rate[j] : 0.0;
+    }
+    set_up_contacts(e, model, start);
+    for (int k = 0; k < model->contacts; ++k) {
+        for (int y = 0; y < e->yielding; ++y) {
+            e->compliance[k][y] = start->sign[k] * start->sign[e->yields[y]] * model->compliance[k][e->yields[y]];
+        }
+    }
+}
+
+static void extend_penetrations(vi_drift *drift, const equation *e, int n)
+{
+    for (int k = 0; k < drift->model->contacts; ++k) {
+        drift->penetration[k][n] = e->is_held[k] ? 0.0 : vi_row_dot(e->toward[k], drift->modal[n], e->width);
+    }
+}
+
+/* ---- forces of contacts ---- */
+
+/* Coefficient n of the force of a power law; coefficient n + 1 of d is known. */
+static double pressed_by_power(vi_power_series *depth, const vi_press *press, const double d[], int n)
+{
+    const double power = depth->power, drag = vi_power_series_extend(depth, d[n + 1]);
+    return press->stiffness * (power + press->damping * drag);
+}
+
+static double pressed_by_line(const vi_press *press, const double d[], int n)
+{
     const double rate = (double)(n + 1) * d[n + 1];
-    if (press->kind == VI_PRESS_LINEAR) {
-        return (n == 0 ? press->constant : 0.0) + press->stiffness * d[n] + press->damping * rate;
-    }
-    extend_power(d, press->exponent, n, power);
-    double drag = 0.0;
-    for (int i = 0; i <= n && press->damping != 0.0; ++i) {
-        drag += power[i] * (double)(n - i + 1) * d[n - i + 1];
-    }
-    return press->stiffness * (power[n] + press->damping * drag);
+    return (n == 0 ? press->constant : 0.0) + press->stiffness * d[n] + press->damping * rate;
 }
 
-/* Taylor coefficient n of everything in q'' but the forces of contacts. */
-static void free_load(const vi_drift *drift, const vi_drift_start *start, double drive, int n, double load[])
+/* Coefficient n of the forces of the contacts that yield. */
+static void press(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, vi_power_series power[])
+{
+    for (int i = 0; i < e->yielding; ++i) {
+        const int k = e->yields[i];
+        const vi_press *law = &start->press[k];
+        const double *d = drift->penetration[k];
+        drift->force[k][n] = law->kind == VI_PRESS_LINEAR ? pressed_by_line(law, d, n)
+                                                          : pressed_by_power(&power[k], law, d, n);
+    }
+}
+
+/* ---- the next coefficient of the motion ---- */
+
+/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The
+ * numbers of contacts, and of those that yield, are constants where there is one. The contacts do not wait for the modes:
+ * what the forces do to them is known from the compliances. */
+static inline void extend_beside(vi_drift *drift, const equation *restrict e, double drive, int n, double share,
+                                 int contacts, int yielding)
+{
+    const double *restrict x = drift->modal[n], *restrict v = drift->modal[n + 1];
+    double *restrict next = drift->modal[n + 2], sum[VI_PORTS][VI_LANES];
+    const double order = (double)(n + 1);
+    for (int k = 0; k < contacts; ++k) {
+        sum[k][0] = sum[k][1] = 0.0;
+    }
+    for (int j = 0; j < e->width; j += VI_LANES) {
+        double load[VI_LANES];
+        for (int i = 0; i < VI_LANES; ++i) {
+            load[i] = drive * e->force[j + i] - e->stiffness[j + i] * x[j + i] - order * (e->drag[j + i] * v[j + i]);
+        }
+        for (int k = 0; k < contacts; ++k) {
+            for (int i = 0; i < VI_LANES; ++i) {
+                sum[k][i] += e->toward[k][j + i] * load[i];
+            }
+        }
+        for (int y = 0; y < yielding; ++y) {
+            const double *restrict toward = &e->toward[e->yields[y]][j], force = drift->force[e->yields[y]][n];
+            for (int i = 0; i < VI_LANES; ++i) {
+                load[i] -= force * toward[i];
+            }
+        }
+        for (int i = 0; i < VI_LANES; ++i) {
+            next[j + i] = share * load[i];
+        }
+    }
+    for (int k = 0; k < contacts; ++k) {
+        double all = sum[k][0] + sum[k][1];
+        for (int y = 0; y < yielding; ++y) {
+            all -= e->compliance[k][y] * drift->force[e->yields[y]][n];
+        }
+        drift->penetration[k][n + 2] = share * all;
+    }
+}
+
+static void extend(vi_drift *drift, const equation *e, double drive, int n, double share)
+{
+    if (drift->model->contacts == 1 && e->yielding == 1) {
+        extend_beside(drift, e, drive, n, share, 1, 1);
+    } else {
+        extend_beside(drift, e, drive, n, share, drift->model->contacts, e->yielding);
+    }
+}
+
+/* The damping that couples the modes. */
+static void drag(vi_drift *drift, int n, double share)
 {
     const vi_structure_model *model = drift->model;
     const double order = (double)(n + 1);
     for (int j = 0; j < model->modes; ++j) {
-        const vi_mode *mode = &model->mode[j];
-        const double first = start->held[j] - mode->stiffness * start->q[j];
-        const double held = n == 0 ? first : n == 1 ? start->held_rate[j] : 0.0;
-        load[j] = drive * mode->force + held - mode->stiffness * drift->modal[n][j];
-    }
-    for (int j = 0; j < model->modes && !model->coupled; ++j) {
-        load[j] -= 2.0 * model->mode[j].decay * order * drift->modal[n + 1][j];
-    }
-    for (int j = 0; j < model->modes && model->coupled; ++j) {
-        for (int i = 0; i < model->modes; ++i) {
-            load[j] -= model->coupling[j][i] * order * drift->modal[n + 1][i];
-        }
-    }
-}
-
-static void push(const vi_structure_model *model, int k, double force, double load[])
-{
-    for (int j = 0; j < model->modes; ++j) {
-        load[j] -= model->shape[k][j] * force;
+        drift->modal[n + 2][j] -= share * order * vi_structure_at(model, model->coupling[j], drift->modal[n + 1]);
     }
 }
 
 /* The forces that keep the held contacts at rest: shape_k . q'' = 0 for each of them. */
-static void hold(vi_drift *drift, const vi_drift_start *start, int n, double load[])
+static void hold(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, double share)
 {
     const vi_structure_model *model = drift->model;
-    double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, f[VI_PORTS];
-    int held[VI_PORTS] = {0};
+    double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, f[VI_PORTS], *next = drift->modal[n + 2];
     for (int k = 0; k < model->contacts; ++k) {
-        held[k] = start->press[k].kind == VI_PRESS_HOLD;
         for (int l = 0; l < model->contacts; ++l) {
             g[k][l] = start->sign[k] * start->sign[l] * model->compliance[k][l];
         }
-        b[k] = held[k] ? start->sign[k] * at_contact(model, k, load) : 0.0;
+        b[k] = e->is_held[k] ? vi_row_dot(e->toward[k], next, e->width) : 0.0;
     }
-    vi_solve_active(model->contacts, g, b, held, f);
+    vi_solve_active(model->contacts, g, b, e->is_held, f);
     for (int k = 0; k < model->contacts; ++k) {
-        if (held[k]) {
-            drift->force[k][n] = f[k];
-            push(model, k, start->sign[k] * f[k], load);
+        if (e->is_held[k]) {
+            drift->force[k][n] = f[k] / share;
+            vi_row_add(next, -f[k], e->toward[k], e->width);
         }
     }
 }
 
-static void extend_penetrations(vi_drift *drift, const vi_drift_start *start, int n)
-{
-    for (int k = 0; k < drift->model->contacts; ++k) {
-        const int still = start->press[k].kind == VI_PRESS_HOLD;
-        drift->penetration[k][n] = still ? 0.0 : start->sign[k] * at_contact(drift->model, k, drift->modal[n]);
-    }
-}
+/* ---- a drift ---- */
 
 static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
 {
@@ -139,6 +224,31 @@ static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
         }
         drift->force_scale[k] = size / fabs(model->mobility[k][k]);
     }
+}
+
+/* The largest modulus of a row. */
+static double largest(const double row[], int width)
+{
+    double most = 0.0;
+    for (int j = 0; j < width; ++j) {
+        most = vi_max(most, fabs(row[j]));
+    }
+    return most;
+}
+
+/* Length of the segment times its fastest rate. */
+static double reach(const vi_drift *drift, const equation *e, double fastest)
+{
+    const double first = largest(drift->modal[1], e->width), second = largest(drift->modal[2], e->width);
+    const double last = largest(drift->modal[VI_ORDER], e->width),
+                 before = largest(drift->modal[VI_ORDER - 1], e->width);
+    for (size_t i = 0; i < sizeof REACHES / sizeof *REACHES; ++i) {
+        const double u = REACHES[i] / fastest, u2 = u * u, u4 = u2 * u2, u8 = u4 * u4;
+        if (u8 * u8 * u8 * (before + last * u) <= NEGLIGIBLE * vi_max(first, second * u)) {
+            return REACHES[i];
+        }
+    }
+    return REACH;
 }
 
 /* A power law's own length: up to where its last terms are below the tolerance. */
@@ -175,79 +285,105 @@ static void end_series(vi_drift *drift, int order)
     }
 }
 
-/* Has a power law's series grown too steep to be continued? */
-static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, double power[VI_PORTS][VI_ORDER + 1])
+/* Has a power law's series grown too steep to be continued beyond coefficient n + 2? */
+static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, const vi_power_series power[])
 {
     for (int k = 0; k < drift->model->contacts; ++k) {
         if (start->press[k].kind == VI_PRESS_POWER
-            && !(fabs(drift->penetration[k][n + 2]) < LARGEST_COEFFICIENT && fabs(power[k][n]) < LARGEST_COEFFICIENT)) {
+            && !(fabs(drift->penetration[k][n + 2]) < LARGEST_COEFFICIENT
+                 && fabs(power[k].power) < LARGEST_COEFFICIENT)) {
             return true;
         }
     }
     return false;
 }
 
-void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, double length)
+static void start_series(vi_drift *drift, const equation *e, const vi_drift_start *start, vi_power_series power[])
 {
-    double power[VI_PORTS][VI_ORDER + 1], load[VI_MODES];
-    const double w = model->clock.angular_frequency;
-    double drive[2] = {start->cosine, -w * start->sine};
-    int any_held = 0, any_yielding = 0;
-    for (int k = 0; k < model->contacts; ++k) {
-        any_held |= start->press[k].kind == VI_PRESS_HOLD;
-        any_yielding |= start->press[k].kind >= VI_PRESS_LINEAR;
-    }
-    drift->model = model;
-    drift->order = VI_ORDER;
-    memset(drift->force, 0, sizeof drift->force);
-    for (int j = 0; j < model->modes; ++j) {
+    const vi_structure_model *model = drift->model;
+    memset(drift->force, 0, (size_t)model->contacts * sizeof drift->force[0]);
+    for (int j = 0; j < e->width; ++j) {
         drift->modal[0][j] = 0.0;
-        drift->modal[1][j] = start->p[j];
+        drift->modal[1][j] = j < model->modes ? start->p[j] : 0.0;
     }
-    extend_penetrations(drift, start, 1);
+    extend_penetrations(drift, e, 1);
     for (int k = 0; k < model->contacts; ++k) {
         drift->penetration[k][0] = start->penetration[k];
+        if (start->press[k].kind == VI_PRESS_POWER) {
+            vi_power_series_begin(&power[k], start->press[k].exponent, start->penetration[k]);
+        }
     }
+}
+
+void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, double length)
+{
+    vi_power_series power[VI_PORTS];
+    equation e;
+    const double w = model->clock.angular_frequency;
+    double drive[2] = {start->cosine, -w * start->sine};
+    drift->model = model;
+    drift->order = VI_ORDER;
+    drift->rooted = 0;
+    set_up(&e, model, start);
+    start_series(drift, &e, start, power);
     for (int n = 0; n + 2 <= VI_ORDER; ++n) {
         const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
-        free_load(drift, start, drive[0], n, load);
-        for (int k = 0; k < model->contacts; ++k) {
-            if (start->press[k].kind == VI_PRESS_LINEAR || start->press[k].kind == VI_PRESS_POWER) {
-                drift->force[k][n] = pressed(drift, k, &start->press[k], n, power[k]);
-                push(model, k, start->sign[k] * drift->force[k][n], load);
-            }
+        press(drift, &e, start, n, power);
+        extend(drift, &e, drive[0], n, share);
+        if (n < 2) {
+            vi_row_add(drift->modal[n + 2], share, e.held[n], e.width);
         }
-        if (any_held) {
-            hold(drift, start, n, load);
+        if (model->coupled) {
+            drag(drift, n, share);
         }
-        for (int j = 0; j < model->modes; ++j) {
-            drift->modal[n + 2][j] = load[j] * share;
+        if (e.any_held) {
+            hold(drift, &e, start, n, share);
         }
-        extend_penetrations(drift, start, n + 2);
+        if (n < 2 || model->coupled || e.any_held) {
+            extend_penetrations(drift, &e, n + 2);
+        }
         drive[0] = drive[1];
         drive[1] = next;
-        if (too_steep(drift, start, n, power)) {
+        if (e.any_power && too_steep(drift, start, n, power)) {
             end_series(drift, n + 1);
             break;
         }
     }
     scale_of_holding(drift, start);
     const double fastest = fastest_rate(model, start);
-    drift->length = fastest > 0.0 ? vi_min(length, (any_yielding ? REACH_YIELDING : REACH) / fastest) : length;
+    drift->length = fastest > 0.0 ? vi_min(length, reach(drift, &e, fastest) / fastest) : length;
     shorten(drift, start);
 }
 
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[])
 {
-    for (int j = 0; j < drift->model->modes; ++j) {
-        double x = drift->modal[VI_ORDER][j], v = 0.0;
-        for (int n = VI_ORDER - 1; n >= 0; --n) {
-            v = v * u + x;
-            x = x * u + drift->modal[n][j];
+    const int modes = drift->model->modes, least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
+    const double r = vi_drift_variable(drift, u);
+    for (int j = 0; j < modes; j += VI_LANES) {
+        double x[VI_LANES], v[VI_LANES] = {0.0};
+        memcpy(x, &drift->modal[VI_ORDER][j], sizeof x);
+        for (int n = VI_ORDER - 1; n >= least; --n) {
+            const double *c = &drift->modal[n][j];
+            for (int i = 0; i < VI_LANES; ++i) {
+                v[i] = v[i] * r + x[i];
+                x[i] = x[i] * r + c[i];
+            }
         }
-        q_end[j] = q[j] + x;
-        p_end[j] = v;
+        for (int i = 0; i < VI_LANES && j + i < modes; ++i) {
+            q_end[j + i] = q[j + i] + (drift->rooted ? u * x[i] : x[i]);
+            p_end[j + i] = drift->rooted ? x[i] + 0.5 * r * v[i] : v[i];
+        }
     }
+}
+
+double vi_drift_impulse(const vi_drift *drift, int k, double u)
+{
+    const double r = vi_drift_variable(drift, u), step = drift->rooted ? 2.0 : 1.0;
+    double sum = 0.0;
+    for (int n = VI_ORDER; n >= 0; --n) {
+        sum = sum * r + drift->force[k][n] / ((double)n / step + 1.0);
+    }
+    return sum * u;
 }
 
 void vi_drift_point(const vi_drift *drift, const double shape[], double polynomial[VI_ORDER + 1])

@@ -9,8 +9,11 @@
 #ifndef VIBROIMPACT_COUPLED_FLOW_H
 #define VIBROIMPACT_COUPLED_FLOW_H
 
+#include <math.h>
+
 #include "body/modal/structure_state.h"
 #include "motion/polynomial.h"
+#include "motion/rows.h"
 
 typedef enum {
     VI_PRESS_NONE = 0,
@@ -25,15 +28,25 @@ typedef struct {
     double constant, stiffness, damping, exponent;
 } vi_press;
 
+/* A row of modes. */
+enum { VI_ROW = VI_WHOLE_LANES(VI_MODES) };
+
 typedef struct {
     const vi_structure_model *model;
     double length;                              /* valid for 0 <= u <= length, s */
     int order;                                  /* of the polynomials; VI_ORDER but for the first touch of a power law */
-    double modal[VI_ORDER + 1][VI_MODES];       /* modal displacements from the start; modal[0] = 0 */
+    int rooted;                                 /* they are polynomials of the square root of time: entry_flow.h */
+    double modal[VI_ORDER + 1][VI_ROW];         /* modal displacements from the start; modal[0] = 0 */
     double penetration[VI_PORTS][VI_ORDER + 1]; /* d of each contact; [0] is its value at the start */
     double force[VI_PORTS][VI_ORDER + 1];       /* F of each contact, N; the last two coefficients are 0 */
     double force_scale[VI_PORTS];               /* of holding forces: size of the terms added up, N */
 } vi_drift;
+
+/* What its polynomials are of, after u seconds. */
+static inline double vi_drift_variable(const vi_drift *drift, double u)
+{
+    return drift->rooted ? sqrt(u) : u;
+}
 
 /* What a drift starts from. */
 typedef struct {
@@ -50,7 +63,10 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
 /* Modal state after u, from the state at the start. */
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[]);
 
-/* Taylor polynomial of a point's displacement from the start. */
+/* Integral of the force of contact k over u seconds, N s. */
+double vi_drift_impulse(const vi_drift *drift, int k, double u);
+
+/* Polynomial of a point's displacement from the start. */
 void vi_drift_point(const vi_drift *drift, const double shape[], double polynomial[VI_ORDER + 1]);
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/modal/entry_flow.h"
 #include "body/modal/structure_contact.h"
 #include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
@@ -30,9 +31,7 @@ static bool coasts(const vi_structure *s, int k, double depth, double rate)
 
 static void look(const vi_structure *s, vi_situation *now)
 {
-    double force[VI_PORTS];
-    bool any_power = false;
-    now->any_thin = false;
+    now->any_thin = now->any_acceleration = false;
     now->length = HUGE_VAL;
     vi_structure_held_now(s, now->held);
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -48,34 +47,98 @@ static void look(const vi_structure *s, vi_situation *now)
         if (now->kept[k]) { /* its force is what it is: rounding would move it, and set the pace */
             now->press[k] = (vi_press){VI_PRESS_LINEAR, vi_structure_yield(s, k).force, 0.0, 0.0, 1.0};
         }
-        any_power = any_power || now->press[k].kind == VI_PRESS_POWER;
     }
-    if (!any_power) {
-        return;
+}
+
+/* Depth that is no more than rounding, of contact k. */
+static double shallow_depth(const vi_structure *s, int k)
+{
+    return SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+}
+
+/* Is a power law pressed in deeper than any thin contact, whose time is a radian at most? */
+static bool is_deep(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration)
+{
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
+    const double thickest = rate > 0.0 ? ENTRY * (rate + 0.5 * fabs(acceleration) * radian) * radian : -rate * radian;
+    return now->at[k] > thickest && now->at[k] > shallow_depth(s, k);
+}
+
+/* Is power law k thin? For how long at most? */
+static bool is_thin(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration,
+                    double *time)
+{
+    const double depth = vi_max(0.0, now->at[k]), shallow = shallow_depth(s, k);
+    *time = vi_thin_time(s, k, rate, now->acceleration, rate < 0.0 && depth > shallow ? -depth / rate : 0.0);
+    /* the way in: as far as its series would need steps much shorter than this one */
+    const double reached = (rate + 0.5 * vi_max(0.0, acceleration) * *time) * *time;
+    const double entered = vi_max(ENTRY * reached, shallow);
+    const double left = vi_max(-rate * *time, coasts(s, k, depth, rate) ? shallow : 0.0);
+    return rate <= 0.0 ? depth <= left || depth == 0.0 : depth <= entered;
+}
+
+static void look_at_power(const vi_structure *s, vi_situation *now, int k, double rate)
+{
+    double force[VI_PORTS], time;
+    if (!now->any_acceleration) {
+        vi_structure_accelerate(s, now->acceleration, force);
+        now->any_acceleration = true;
     }
-    vi_structure_accelerate(s, now->acceleration, force);
+    const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration) * vi_structure_direction(s, k);
+    if (!is_deep(s, now, k, rate, a) && is_thin(s, now, k, rate, a, &time)) {
+        now->thin[k] = 1;
+        now->any_thin = true;
+        now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
+        now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
+    }
+}
+
+/* Which power laws are thin, and how far the others' series may go. */
+static void look_at_powers(const vi_structure *s, vi_situation *now)
+{
     for (int k = 0; k < s->model->contacts; ++k) {
-        if (now->press[k].kind != VI_PRESS_POWER) {
-            continue;
-        }
-        const double rate = vi_structure_approach(s, k), depth = vi_max(0.0, now->at[k]);
-        const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration);
-        const double time = vi_thin_time(s, k, rate, now->acceleration);
-        /* the way in: as far as its series would need steps much shorter than this one */
-        const double reached = (rate + 0.5 * vi_max(0.0, vi_structure_direction(s, k) * a) * time) * time;
-        const double shallow = SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
-        const double entered = vi_max(ENTRY * reached, shallow);
-        const double left = vi_max(-rate * time, coasts(s, k, depth, rate) ? shallow : 0.0);
-        if (rate <= 0.0 ? depth <= left || depth == 0.0 : depth <= entered) {
-            now->thin[k] = 1;
-            now->any_thin = true;
-            now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
-            now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
-        } else if (rate < 0.0) {
-            /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
-            now->length = vi_min(now->length, -depth / rate);
+        if (now->press[k].kind == VI_PRESS_POWER) {
+            const double rate = vi_structure_approach(s, k);
+            if (rate > 0.0 || !is_deep(s, now, k, rate, 0.0)) {
+                look_at_power(s, now, k, rate);
+            }
+            if (rate < 0.0 && !now->thin[k]) {
+                /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
+                now->length = vi_min(now->length, -now->at[k] / rate);
+            }
         }
     }
+}
+
+/* The one contact that begins to press at this instant, by a power law, while all others are free and off their stops;
+ * -1: there is none. */
+static int entering(const vi_structure *s, const vi_situation *now)
+{
+    int found = -1;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_YIELDING && s->state->leaving[k] == 1
+            && now->press[k].kind == VI_PRESS_POWER && found < 0 && vi_structure_approach(s, k) > 0.0) {
+            found = k;
+        } else if (s->state->status[k] != VI_CONTACT_FREE
+                   || (vi_structure_watched(s, k)
+                       && -now->at[k] <= VI_ROUNDING * vi_structure_displacement_size(s, k))) {
+            return -1;
+        }
+    }
+    return s->model->coupled ? -1 : found;
+}
+
+/* Follow the beginning of a contact, where that goes further in than rounding. */
+static bool enter(const vi_structure *s, const vi_situation *now, const vi_drift_start *start, double length,
+                  vi_drift *drift)
+{
+    double depth[4];
+    const int k = entering(s, now);
+    if (k < 0 || !vi_entry_begin(drift, s->model, start, k, length)) {
+        return false;
+    }
+    vi_polynomial_at(drift->penetration[k], sqrt(drift->length), depth);
+    return depth[0] > shallow_depth(s, k);
 }
 
 /* ---- one segment ---- */
@@ -86,11 +149,7 @@ static void add_impulses(const vi_structure *s, const vi_drift *drift, const vi_
         if (now->thin[k]) {
             vi_thin_impulse(s, k, now->at[k], drift->penetration[k][1], u);
         } else if (s->state->status[k] == VI_CONTACT_YIELDING) {
-            double sum = 0.0;
-            for (int n = VI_ORDER; n >= 0; --n) {
-                sum = sum * u + drift->force[k][n] / (double)(n + 1);
-            }
-            s->state->touch_down[k].impulse += sum * u;
+            s->state->touch_down[k].impulse += vi_drift_impulse(drift, k, u);
         }
     }
 }
@@ -123,7 +182,8 @@ static void follow_energies(const vi_structure *s, const vi_drift *drift, const 
         double moved[VI_ORDER + 1];
         memcpy(moved, drift->penetration[k], sizeof moved);
         moved[0] = 0.0;
-        still[k] = s->state->status[k] == VI_CONTACT_YIELDING && vi_structure_stays(s, drift, k, moved, u);
+        still[k] = s->state->status[k] == VI_CONTACT_YIELDING
+                   && vi_structure_stays(s, drift, k, moved, vi_drift_variable(drift, u));
     }
     vi_energies_of_drift(s, drift, now->held, still, u);
 }
@@ -171,7 +231,10 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     vi_budget_spend(&state->budget, drift_evaluations(s->model));
     const vi_drift_start start = {state->q,   state->p, phase.cosine, phase.sine, now.held, state->held_rate,
                                   now.at, now.sign, now.press};
-    vi_drift_begin(&drift, s->model, &start, vi_min(length + room, now.length));
+    if (!enter(s, &now, &start, length + room, &drift)) {
+        look_at_powers(s, &now);
+        vi_drift_begin(&drift, s->model, &start, vi_min(length + room, now.length));
+    }
     const bool to_end = drift.length >= length;
     const double reach = to_end ? length : drift.length;
     const vi_event_found first = vi_structure_first_event(s, &drift, &now, reach, vi_max(reach, drift.length));

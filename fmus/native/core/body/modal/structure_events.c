@@ -200,6 +200,44 @@ static void pressing(const vi_situation *now, int k, const double depth[VI_ORDER
     sense[0] += power ? 1.0 : press->constant;
 }
 
+/* Where a contact that has just begun might end: depth = r^2 e(r), whose rate is e + r e' / 2. */
+static void ends_of_entry(const vi_drift *drift, const vi_situation *now, int k, double length, vi_event_found *first)
+{
+    double depth[VI_ORDER + 1], sense[VI_ORDER + 1];
+    memcpy(depth, drift->penetration[k], sizeof depth);
+    divide(depth, 2);
+    for (int n = 0; n <= VI_ORDER; ++n) {
+        sense[n] = now->press[k].damping * (0.5 * (double)n + 1.0) * depth[n];
+    }
+    sense[0] += 1.0;
+    if (!vi_polynomial_clears(depth, length)) {
+        const vi_fall fall = fall_through(depth, length, VI_ROUNDING * vi_polynomial_size(depth, length));
+        consider(first, &fall, VI_DRIFT_SEPARATION, k);
+    }
+    if (!vi_polynomial_clears(sense, length)) {
+        const vi_fall fall = fall_through(sense, length, VI_ROUNDING * vi_polynomial_size(sense, length));
+        consider(first, &fall, VI_DRIFT_SEPARATION, k);
+    }
+}
+
+/* Where the force of a yielding contact falls through zero. */
+static void ends_of_force(const vi_structure *s, const vi_situation *now, int k, const double depth[VI_ORDER + 1],
+                          double length, vi_event_found *first)
+{
+    double force[VI_ORDER + 1];
+    pressing(now, k, depth, force);
+    if (vi_polynomial_clears(force, length)) {
+        return;
+    }
+    const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
+    vi_fall fall = {true, 0.0, 1.0};
+    /* else an impact elsewhere, or the start, has thrown the point off its stop */
+    if (force[0] >= -rounding || force[0] >= -pressing_noise(s, k)) {
+        fall = fall_through(force, length, rounding);
+    }
+    consider(first, &fall, VI_DRIFT_SEPARATION, k);
+}
+
 static void separations(const vi_structure *s, const vi_drift *drift, const vi_situation *now, int k, double length,
                         vi_event_found *first)
 {
@@ -213,17 +251,9 @@ static void separations(const vi_structure *s, const vi_drift *drift, const vi_s
         depth[2] = vi_max(0.0, depth[2]);
     }
     if (!now->thin[k]) {
-        double force[VI_ORDER + 1];
-        pressing(now, k, depth, force);
-        const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
-        vi_fall fall = {true, 0.0, 1.0};
-        /* else an impact elsewhere, or the start, has thrown the point off its stop */
-        if (force[0] >= -vi_max(rounding, pressing_noise(s, k))) {
-            fall = fall_through(force, length, rounding);
-        }
-        consider(first, &fall, VI_DRIFT_SEPARATION, k);
+        ends_of_force(s, now, k, depth, length, first);
     }
-    if (depth[0] > 0.0 || depth[1] < 0.0) {
+    if ((depth[0] > 0.0 || depth[1] < 0.0) && !vi_polynomial_clears(depth, length)) {
         const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(depth, length));
         const vi_fall fall = fall_through(depth, length, now->thin[k] ? VI_ROUNDING * fabs(depth[0]) : noise);
         consider(first, &fall, VI_DRIFT_SEPARATION, k);
@@ -286,6 +316,8 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
 vi_event_found vi_structure_first_event(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double length,
                                double searched)
 {
+    length = vi_drift_variable(drift, length);
+    searched = vi_drift_variable(drift, searched);
     vi_event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1, length};
     /* compliant stops first: of events at one instant theirs comes first, one that would pull no longer bears on others */
     for (int turn = 0; turn < 2 * s->model->contacts; ++turn) {
@@ -300,7 +332,9 @@ vi_event_found vi_structure_first_event(const vi_structure *s, const vi_drift *d
         case VI_CONTACT_TOUCHING: arrivals(s, drift, now, k, searched, &first); break;
         case VI_CONTACT_HELD: releases(s, drift, now, k, length, &first); break;
         case VI_CONTACT_YIELDING:
-            if (!now->kept[k]) {
+            if (drift->rooted) {
+                ends_of_entry(drift, now, k, length, &first);
+            } else if (!now->kept[k]) {
                 separations(s, drift, now, k, length, &first);
             }
             break;
@@ -309,5 +343,9 @@ vi_event_found vi_structure_first_event(const vi_structure *s, const vi_drift *d
     }
     const bool cut = first.searched < length && first.searched < first.time;
     vi_budget_spend(&s->state->budget, first.searched < length ? VI_MOST_EVALUATIONS : 0);
-    return cut || first.event == VI_DRIFT_NO_EVENT ? (vi_event_found){first.searched, VI_DRIFT_NO_EVENT, -1, 0.0} : first;
+    if (cut || first.event == VI_DRIFT_NO_EVENT) {
+        first = (vi_event_found){first.searched, VI_DRIFT_NO_EVENT, -1, 0.0};
+    }
+    first.time = drift->rooted ? first.time * first.time : first.time;
+    return first;
 }

@@ -23,8 +23,8 @@ typedef struct {
     vi_press press[VI_PORTS];
     int thin[VI_PORTS]; /* of a power law: so little penetration that its force acts as an impulse */
     int kept[VI_PORTS]; /* yielding: stays as it is, its point is held */
-    bool any_thin;
-    double acceleration[VI_MODES]; /* with all forces; only where there is a power law */
+    bool any_thin, any_acceleration;
+    double acceleration[VI_MODES]; /* with all forces; only where a power law may be thin */
     double length;                 /* that thin contacts and relaxing surfaces allow, s */
 } vi_situation;
 

@@ -104,10 +104,16 @@ void vi_structure_project(const vi_structure *s)
     const vi_structure_model *model = s->model;
     vi_structure_state *state = s->state;
     double g[VI_PORTS][VI_PORTS], x[VI_PORTS], v[VI_PORTS], dx[VI_PORTS], dv[VI_PORTS];
-    int held[VI_PORTS] = {0};
-    vi_structure_signed(s, s->model->compliance, g);
+    int held[VI_PORTS] = {0}, any = 0;
     for (int k = 0; k < model->contacts; ++k) {
         held[k] = state->status[k] == VI_CONTACT_HELD;
+        any |= held[k];
+    }
+    if (!any) {
+        return;
+    }
+    vi_structure_signed(s, s->model->compliance, g);
+    for (int k = 0; k < model->contacts; ++k) {
         const double sign = vi_structure_direction(s, k);
         x[k] = sign * (vi_structure_at(model, model->shape[k], state->q) - s->contacts[k].position);
         v[k] = sign * vi_structure_at(model, model->shape[k], state->p);

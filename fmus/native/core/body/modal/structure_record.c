@@ -98,24 +98,25 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
 {
     double polynomial[VI_ORDER + 1], slope[VI_ORDER + 1], value[4], from = 0.0;
     const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
+    const double end = vi_drift_variable(drift, u);
     vi_drift_point(drift, s->model->observed, polynomial);
     extend(s, here);
-    vi_polynomial_at(polynomial, u, value);
+    vi_polynomial_at(polynomial, end, value);
     extend(s, here + value[0]);
-    if (vi_polynomial_size(polynomial, u) <= VI_ROUNDING * fabs(here)) {
+    if (vi_polynomial_size(polynomial, end) <= VI_ROUNDING * fabs(here)) {
         return; /* it is held: what its polynomial says is rounding */
     }
-    for (int turn = 0; turn < 16 && from < u; ++turn) {
+    for (int turn = 0; turn < 16 && from < end; ++turn) {
         vi_polynomial_at(polynomial, from, value);
         const double sign = value[1] != 0.0 ? copysign(1.0, value[1]) : copysign(1.0, value[2]);
         differentiate(polynomial, sign, slope);
-        const vi_fall fall = vi_polynomial_fall(slope, from, u, 4.0 * DBL_EPSILON * vi_polynomial_size(slope, u));
+        const vi_fall fall = vi_polynomial_fall(slope, from, end, 4.0 * DBL_EPSILON * vi_polynomial_size(slope, end));
         if (!fall.found) {
             return;
         }
         vi_polynomial_at(polynomial, fall.time, value);
         extend(s, here + value[0]);
-        from = fall.time + 1e-3 * u;
+        from = fall.time + 1e-3 * end;
     }
 }
 
@@ -170,14 +171,15 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
     const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
     double q[VI_MODES], p[VI_MODES], weight, value[4];
     for (int i = 0; i < 8; ++i) {
-        const double t = node(0.0, u, i, &weight);
+        const double r = node(0.0, vi_drift_variable(drift, u), i, &weight), t = drift->rooted ? r * r : r;
+        const double slope = drift->rooted ? 2.0 * r : 1.0; /* of t over r */
         vi_drift_at(drift, t, s->state->q, p, q);
-        add_powers(s, p, held, t, angle + w * t, weight);
+        add_powers(s, p, held, t, angle + w * t, slope * weight);
         for (int k = 0; k < s->model->contacts; ++k) {
             if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
-                vi_polynomial_at(drift->force[k], t, value);
+                vi_polynomial_at(drift->force[k], r, value);
                 const double force = value[0];
-                vi_polynomial_at(drift->penetration[k], t, value);
+                vi_polynomial_at(drift->penetration[k], r, value);
                 s->state->energies.contact_loss += weight * force * value[1];
             }
         }

@@ -35,8 +35,10 @@ static double jerk_size(const vi_structure *s, int k, const double acceleration[
     return size;
 }
 
-/* How long the force may act as that of a penetration at constant rate, within the tolerance; at most `longest`. */
-static double accurate_time(const vi_structure *s, int k, double rate, const double acceleration[], double longest)
+/* How long the force may act as that of a penetration at constant rate, within the tolerance; at most `longest`, sought down
+ * to `least`. */
+static double accurate_time(const vi_structure *s, int k, double rate, const double acceleration[], double longest,
+                            double least)
 {
     const vi_press press = vi_structure_press(s, k);
     const double n = press.exponent, stiffness = press.stiffness * s->model->compliance[k][k];
@@ -44,7 +46,7 @@ static double accurate_time(const vi_structure *s, int k, double rate, const dou
     const double jerk = jerk_size(s, k, acceleration) * sqrt(s->model->compliance[k][k]);
     const double fastest = s->model->fastest, tolerance = s->model->tolerance;
     double t = longest;
-    for (int halving = 0; halving < 1000 && t > 0.0; ++halving, t *= 0.5) {
+    for (int halving = 0; halving < 1000 && t > least; ++halving, t *= 0.5) {
         const double turn = (pull + 0.5 * jerk * t) * t; /* of the rate, at most, by everything else */
         const double depth = (speed + (0.5 * pull + jerk * t / 6.0) * t) * t;
         const double plain = stiffness * pow(depth, n) * t;
@@ -59,10 +61,10 @@ static double accurate_time(const vi_structure *s, int k, double rate, const dou
     return t;
 }
 
-double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[])
+double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[], double least)
 {
     const double longest = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
-    const double accurate = accurate_time(s, k, rate, acceleration, longest);
+    const double accurate = accurate_time(s, k, rate, acceleration, longest, least);
     const double rounding = DBL_EPSILON * vi_structure_displacement_size(s, k);
     const double moves = rate != 0.0 ? vi_min(rounding / fabs(rate), longest) : 0.0;
     if (moves <= accurate) {

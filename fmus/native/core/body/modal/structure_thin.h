@@ -7,8 +7,8 @@
 
 /* How long the force of power law k may act as that of a penetration at constant rate, s: as long as the tolerance
  * allows, and at least until the penetration has changed by a rounding of the displacement. The penetration may begin
- * without speed, or where damping leaves no force. */
-double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[]);
+ * without speed, or where damping leaves no force. Below `least` the time is of no interest, and not sought further. */
+double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[], double least);
 
 /* Give the impulse of a thin contact over u seconds of constant rate, to the state at the end. */
 void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, double u);
