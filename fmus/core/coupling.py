@@ -63,7 +63,7 @@ class CouplingComponent(Structure):
     _fields_ = [
         ("step", CouplingCall),
         *((name, CouplingCalls) for name in ("inputs", "save", "restore", "event_times")),
-        *((name, c_int32) for name in ("event_mode", "may_return_early")),
+        *((name, c_int32) for name in ("event_mode", "may_return_early", "number")),
         ("internal_step", c_double),
         *((name, c_void_p) for name in ("step_time", "step_size", "last_time", "flags")),
         ("time", c_double),

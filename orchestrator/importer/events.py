@@ -53,7 +53,7 @@ class LateEvents:
         Returns how many of the next events may pass before it hears of them.
     tell : callable
         Called with events that have passed, shape (event, 3): time (s), index among those at the same time, and the
-        index of the component in the order of the importer's components.
+        place of the component in `Importer.components`.
     """
 
     room: Callable[[], int]

@@ -33,12 +33,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.importer.step_plan import Parts, StepPlan
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
-from vibroimpact.orchestrator.importer.wiring import (
-    LoopSolver,
-    SettlingInputs,
-    order_of,
-    transfers_of,
-)
+from vibroimpact.orchestrator.importer.wiring import LoopSolver, SettlingInputs, order_of, transfers_of
 
 #: Steps without progress before the run is given up.
 STANDSTILLS = 100
@@ -136,7 +131,14 @@ class Importer:
         self._looping = [t for t in self.transfers if order.loops_back(t.connections[0])]
         self._order = stepping_order(self.components, connections)
         parts = Parts(
-            self._order, self.transfers, self._looping, self.loops, self.watches, self.contacts, self.tuning
+            self._order,
+            {name: number for number, name in enumerate(self.components)},
+            self.transfers,
+            self._looping,
+            self.loops,
+            self.watches,
+            self.contacts,
+            self.tuning,
         )
         self._progress = Progress()
         self._plan = StepPlan(parts, exchange, self._progress)
@@ -237,15 +239,17 @@ class Importer:
     def _make_plain_steps(self, loop: PlainLoop, end: float, seconds: float) -> None:
         """Make plain steps in C until one is for this class, and finish that one."""
         late = None if self.on_event is None else self.late_events or NO_EVENTS
-        pauses = self.on_pause is not None
-        came_to = loop.advance(end, self.macro_step, seconds, late, hears_pauses=pauses)
+        hears_pauses = self.on_pause is not None
+        came_to = loop.advance(end, self.macro_step, seconds, late, hears_pauses=hears_pauses)
         run = loop.run
-        self._at_event, self.wants_to_end = loop.at_event(), bool(run.wants_to_end)
+        self.wants_to_end = bool(run.wants_to_end)
         if came_to is CouplingEnd.stepped:
+            self._at_event = loop.at_event()
             overtaken = self._step_all(run.start, run.goal, Made(run.at, run.status))
             self._finish(run.start, run.target, overtaken)
         elif came_to is CouplingEnd.reached:
-            self._reached, self._stopper = run.reached, (self._at_event or self._order)[0]
+            self._at_event, self._reached = loop.at_event(), run.reached
+            self._stopper = (self._at_event or self._order)[0]
             self._conclude(run.start, run.target)
         elif came_to is CouplingEnd.failed:
             loop.explain()

@@ -7,7 +7,7 @@ failed, a component that asks for the end, an event to be heard at once) is left
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from ctypes import addressof, c_double, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 
@@ -52,6 +52,8 @@ class PlainLoop:
     ----------
     components : sequence of Component
         In the order in which they are stepped.
+    numbers : mapping of str to int
+        By component: the number by which its events are told.
     start : CallList or None
         What is moved before a step.
     inputs : sequence of CallList or None
@@ -72,6 +74,7 @@ class PlainLoop:
     def __init__(
         self,
         components: Sequence[Component],
+        numbers: Mapping[str, int],
         start: CallList | None,
         inputs: Sequence[CallList | None],
         event_mode: EventMode,
@@ -79,10 +82,11 @@ class PlainLoop:
         saves: bool,
         progress: CouplingProgress,
     ) -> None:
-        self._components, self._progress = components, progress
+        self._components, self._numbers, self._progress = list(components), numbers, progress
         self._known: list[tuple[Instance, str]] = []
         self._kept: list[object] = []  # what C code has addresses of
         self._events = np.zeros((MOST_EVENTS, 3))
+        self._events_address = int(self._events.ctypes.data)
         self._noted, self._noted_time = c_int64(0), c_double(math.nan)
         own = addressof(self._noted), addressof(self._noted_time)
         notes = components[0].instance.wrap
@@ -90,6 +94,7 @@ class PlainLoop:
         steps = [self._component(c, i) for c, i in zip(components, inputs, strict=True)]
         decisions = [addressof(instance.decisions) for instance in event_mode.instances]
         self._steps = (CouplingComponent * len(steps))(*steps)
+        self._stepped = [(c.instance, step) for c, step in zip(components, self._steps, strict=True)]
         self._decisions = (c_void_p * max(1, len(decisions)))(*decisions)
         self._plan = CouplingPlan(
             components=self._steps,
@@ -126,6 +131,7 @@ class PlainLoop:
             event_times=self._calls(reads),
             event_mode=component.event_mode,
             may_return_early=component.event_mode,
+            number=self._numbers[component.name],
             internal_step=instance.internal_step,
             **instance.step_memory,
         )
@@ -214,13 +220,13 @@ class PlainLoop:
         run.end, run.macro_step, run.hears_pauses = end, macro_step, hears_pauses
         run.most_seconds = seconds
         run.wants_to_end, run.events_used = False, 0
-        run.events = None if late is None else self._events.ctypes.data
+        run.events = None if late is None else self._events_address
         run.events_room = 0 if late is None else min(MOST_EVENTS, late.room())
-        for component, step in zip(self._components, self._steps, strict=True):
-            step.time = component.instance.time
+        for instance, step in self._stepped:
+            step.time = instance.time
         came_to = advance_coupled(self._plan, self._progress, run)
-        for component, step in zip(self._components, self._steps, strict=True):
-            component.instance.take_time(step.time)
+        for instance, step in self._stepped:
+            instance.take_time(step.time)
         if late is not None and run.events_used:
             late.tell(self._events[: run.events_used])
         return came_to

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from vibroimpact.orchestrator.importer.component import Component
@@ -25,11 +25,14 @@ class Parts:
     ----------
     components : sequence of Component
         In the order in which they are stepped.
+    numbers : mapping of str to int
+        Their places in the order in which they are told of.
     looping : sequence of Transfer
         The transfers that belong to algebraic loops.
     """
 
     components: Sequence[Component]
+    numbers: Mapping[str, int]
     transfers: Sequence[Transfer]
     looping: Sequence[Transfer]
     loops: LoopSolver
@@ -120,6 +123,7 @@ class StepPlan:
         events = self.event_mode
         if not can_loop(components, [self.start_moves, *inputs, events.begin, events.again]):
             return None
+        numbers, progress = parts.numbers, self._progress
         return PlainLoop(
-            components, self.start_moves, inputs, events, saves=self.saves, progress=self._progress
+            components, numbers, self.start_moves, inputs, events, saves=self.saves, progress=progress
         )

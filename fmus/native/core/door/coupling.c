@@ -252,7 +252,7 @@ static int resolve(const vi_coupling_plan *plan, vi_coupling_run *r)
     return came_to == GO_ON ? make_all(plan, r, &plan->leave) : came_to;
 }
 
-static void note(vi_coupling_progress *p, vi_coupling_run *r)
+static void note(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
 {
     for (int32_t k = 0; k < r->arrived; ++k) {
         p->event_index = p->time == p->event_time ? p->event_index + 1 : 0;
@@ -261,7 +261,7 @@ static void note(vi_coupling_progress *p, vi_coupling_run *r)
             double *row = r->events + 3 * r->events_used;
             row[0] = p->time;
             row[1] = (double)p->event_index;
-            row[2] = (double)r->at_event[k];
+            row[2] = (double)plan->components[r->at_event[k]].number;
             r->events_used += 1;
         }
     }
@@ -282,7 +282,7 @@ static int finish(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coup
     if (r->arrived == 0) {
         return GO_ON;
     }
-    note(p, r);
+    note(plan, p, r);
     return resolve(plan, r);
 }
 

@@ -70,6 +70,7 @@ typedef struct {
     vi_coupling_calls save, restore; /* none where it has no states */
     vi_coupling_calls event_times;  /* FMI 2.0: one read, where it reports its first event */
     int32_t event_mode, may_return_early;
+    int32_t number; /* by which its events are told */
     double internal_step; /* s */
     /* What its step is given and answers, in the memory of the importer's instance; `flags` are those of FMI 3.0: needs
      * event mode, ends, has returned early. */
@@ -102,7 +103,7 @@ typedef struct {
 typedef struct {
     double end, macro_step;  /* s */
     double most_seconds;     /* of wall time */
-    double *events;          /* [events_room][3] time, index, component; NULL: nobody hears of them */
+    double *events;          /* [events_room][3] time, index, number of the component; NULL: nobody hears of them */
     int64_t events_room, events_used;
     int32_t hears_pauses;    /* a step that ends early without an event is the importer's to finish */
     int32_t wants_to_end;    /* a component asks for the end */

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 from support import fmu_factory
@@ -13,12 +11,10 @@ from support.body_scenes import BEAM, CHAIN, BodyScene
 from support.component_fmu import EXTERNAL
 from support.component_fmu import stop as numbered_stop
 from support.coupled_parts import P11, VERSIONS, body, contact, external, link, part, stop
+from support.plain_runs import Run, both
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.importer.events import LateEvents
-from vibroimpact.orchestrator.importer.master import Importer
-from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.importer.specification import ComponentSpec
 
 MIXED = [("3.0", "3.0"), ("2.0", "2.0"), ("3.0", "2.0"), ("2.0", "3.0")]
 END = 60.0
@@ -26,88 +22,15 @@ FAULTS = (
     "error", "fatal", "discard", "not_a_number", "terminate", "stall", "says_nan", "says_infinite",
     "says_beyond", "says_start", "says_past", "end_short", "round_upward", "flush_to_zero", "strange_log",
 )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("fmus")
-
-
 CALLS = {
     "get": "GetFloat64", "set": "SetFloat64", "save": "GetFMUState", "restore": "SetFMUState",
     "event": "UpdateDiscreteStates",
 }  # fmt: skip
 
 
-class Run:
-    """A run of an importer, by plain steps in C or without, and all that is seen of it."""
-
-    def __init__(
-        self,
-        parts: Sequence[ComponentSpec],
-        links: Sequence[ConnectionSpec],
-        *,
-        in_c: bool,
-        room: Callable[[int], int] = lambda seen: 1000,
-        **options: Any,
-    ) -> None:
-        self.importer = Importer(parts, links, **options)
-        self.importer.steps_in_c = in_c
-        self.events: list[tuple[float, int, str]] = []
-        self.pauses: list[float] = []
-        names = [c.name for c in self.importer._order]
-        self.importer.on_event = lambda e: self.events.append((e.time, e.index, e.component))
-        self.importer.on_pause = lambda: self.pauses.append(self.importer.time)
-        self.importer.late_events = LateEvents(
-            lambda: room(len(self.events)),
-            lambda rows: self.events.extend((t, int(i), names[int(k)]) for t, i, k in rows.tolist()),
-        )
-        self.failure = ""
-
-    def go(self, *ends: float) -> Run:
-        """Begin, and advance to each of these times; a failure ends that."""
-        self.importer.begin()
-        try:
-            for end in ends:
-                self.importer.advance(end)
-        except ComponentError as error:
-            self.failure = str(error)
-        return self
-
-    def facts(self) -> dict[str, Any]:
-        """All that another run must have likewise."""
-        importer = self.importer
-        found: dict[str, Any] = {
-            "events": self.events,
-            "pauses": self.pauses,
-            "failure": self.failure,
-            "steps": (importer.steps, importer.repeated_steps),
-            "ends": (importer.time.hex(), importer.wants_to_end, importer.overrun),
-        }
-        for name, component in importer.components.items():
-            instance = component.instance
-            found[name, "said"] = (
-                instance.time.hex(), instance.returned_early, instance.needs_event_mode, instance.wants_to_end,
-                instance.is_flagged, instance.changed_rounding, instance.is_fatal,
-            )  # fmt: skip
-            if not self.failure:
-                real = [v for v, known in component.variables.items() if known.type in ("Float64", "Real")]
-                scalar = [v for v in real if not component.variables[v].dimensions]
-                found[name, "values"] = component.group("Float64", scalar).get().tobytes()
-        return found
-
-
-def both(
-    parts: Sequence[ComponentSpec], links: Sequence[ConnectionSpec], *ends: float, **options: Any
-) -> Run:
-    """Run in C and without; returns the run in C, whose facts are those of the other."""
-    runs = [Run(parts, links, in_c=in_c, **options).go(*ends) for in_c in (True, False)]
-    facts = [run.facts() for run in runs]
-    assert facts[0] == facts[1]
-    for run in runs:
-        run.importer.free()
-    assert runs[0].importer._plan.plain_loop is not None
-    return runs[0]
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fmus")
 
 
 @pytest.mark.parametrize("macro_step", [math.inf, 0.3])
@@ -133,7 +56,7 @@ def test_two_bodies_with_stops_that_are_sent_back_to_each_others_events(versions
 def test_events_that_pass_are_told_in_the_order_and_numbers_of_those_heard_at_once(room: int) -> None:
     # two mirrored bodies hit at one instant, so that a step has two events
     mirrored = {**P11, "forcing.amplitude": -0.5, **external(-1.0, "lower")}
-    parts = [body("a", {**P11, **external(1.0)}), stop("sa"), body("b", mirrored), stop("sb")]
+    parts = [stop("sa"), body("a", {**P11, **external(1.0)}), stop("sb"), body("b", mirrored)]
     run = both(
         parts, [*contact("a", "sa"), *contact("b", "sb")], END, room=lambda seen: room - seen % (room + 1)
     )
