@@ -237,6 +237,7 @@ class Instance(ABC):
             self._pointer.value = None
 
     def _bind_life(self) -> None:
+        self._enter_initialization = self._function("EnterInitializationMode")
         self._exit_initialization = self._bound("ExitInitializationMode")
         self._terminate = self._bound("Terminate")
         self._reset = self._bound("Reset")

@@ -110,7 +110,7 @@ class Instance2(Instance):
         no, zero = c_int(0), c_double(0.0)
         setup = self._function("SetupExperiment")
         self.check(setup(self._pointer, no, zero, c_double(start_time), no, zero), "SetupExperiment")
-        self.check(self._function("EnterInitializationMode")(self._pointer), "EnterInitializationMode")
+        self.check(self._enter_initialization(self._pointer), "EnterInitializationMode")
 
     def take_step(self, status: int) -> int:
         """Take what the step just made has returned and said, as `step` does."""

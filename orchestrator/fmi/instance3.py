@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_bool, c_char_p, c_double, c_size_t, c_uint16, c_uint32, c_void_p
-from functools import partial
 
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Instance, Wrapper
@@ -89,9 +88,9 @@ class Instance3(Instance):
     def enter_initialization(self, start_time: float) -> None:
         """Enter initialization mode at `start_time`, s."""
         self.time = start_time
-        enter = partial(self._function("EnterInitializationMode"), self._pointer)
         no, zero = c_bool(False), c_double(0.0)
-        self.check(enter(no, zero, c_double(start_time), no, zero), "EnterInitializationMode")
+        status = self._enter_initialization(self._pointer, no, zero, c_double(start_time), no, zero)
+        self.check(status, "EnterInitializationMode")
 
     def take_step(self, status: int) -> int:
         """Take what the step just made has returned and said, as `step` does."""

@@ -93,8 +93,8 @@ class Sampler:
         return time if time <= self._end + self._room(self._end) else np.inf
 
     def _patience(self) -> float:
-        """Until it begins nothing is to be seen."""
-        return np.inf if self._first == np.inf else 0.0
+        """Before it begins, and once all samples are taken, nothing is to be seen."""
+        return np.inf if self._next() == np.inf else 0.0
 
     def _take_now(self, time: float) -> None:
         row = np.empty(self._width)
