@@ -2,7 +2,8 @@
 
 They lie in a file that two processes map. When an FMU takes its process down, or hangs, the other process reads
 what it was doing. The call is noted either before every call, which is exact and takes a quarter of the time of
-an impact, or by looking at the frames of the running thread now and then, which tells what hangs and costs nothing.
+an impact where Python makes the calls (in C it is a store), or by looking at the frames of the running thread now
+and then, which tells what hangs and costs nothing.
 """
 
 from __future__ import annotations
@@ -196,15 +197,14 @@ def _time_of(instance: Instance, function: str) -> float:
 
 def _call_in(frame: FrameType) -> tuple[Instance, str, float] | None:
     """Instance, function and time (s) of the FMI call that a frame makes, if it makes one."""
-    owner = frame.f_locals.get("self")
-    if isinstance(owner, PlainLoop):
+    owner, method = frame.f_locals.get("self"), frame.f_code.co_name
+    if isinstance(owner, PlainLoop) and method == "advance":
         return owner.call_under_way()
-    found = _python_call_in(frame, owner)
+    found = _python_call_in(frame, owner, method)
     return None if found is None else (*found, _time_of(*found))
 
 
-def _python_call_in(frame: FrameType, owner: object) -> tuple[Instance, str] | None:
-    method = frame.f_code.co_name
+def _python_call_in(frame: FrameType, owner: object, method: str) -> tuple[Instance, str] | None:
     if isinstance(owner, Instance) and method in METHODS:
         return owner, METHODS[method]
     if isinstance(owner, VariableGroup) and method in ("get", "set"):

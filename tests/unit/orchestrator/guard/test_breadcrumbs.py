@@ -112,7 +112,7 @@ def test_the_frames_of_a_thread_in_c_show_the_call_that_it_is_in(
 
     def advance_and_look(*given: Any) -> CouplingEnd:
         came_to = advance_coupled(*given)
-        writer.note_frame(sys._getframe())  # as another thread sees the last call, which may still last
+        writer.note_frame(sys._getframe())  # as another thread sees the last call
         return came_to
 
     monkeypatch.setattr(plain_loop, "advance_coupled", advance_and_look)
