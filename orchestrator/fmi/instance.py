@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double, c_void_p
 from functools import partial
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,26 @@ WrapOf = Callable[[str], Wrapper]
 """What gives a component, by its name, its log tail or the wrapper of its functions."""
 
 
+@runtime_checkable
+class CallNotes(Protocol):
+    """A wrapper that does nothing but note the call under way, which C code that makes calls can do itself.
+
+    Attributes
+    ----------
+    call_address, time_address : int
+        Where the number of a call is noted, a 64-bit integer, and the time at which a step begins, a double.
+    """
+
+    call_address: int
+    time_address: int
+
+    def __call__(self, name: str, function: Function) -> Function:
+        """Return a function that is noted."""
+
+    def number_of(self, name: str) -> int:
+        """Return the number that a function is noted by."""
+
+
 class Instance(ABC):
     """One instance of a co-simulation FMU, driven by prebound calls.
 
@@ -49,6 +69,8 @@ class Instance(ABC):
 
     Attributes
     ----------
+    state_word : str
+        FMI's word for a saved state in the names of its functions, which its versions write differently.
     time : float
         The time reached by the last `step`, s.
     internal_step : float
@@ -65,6 +87,7 @@ class Instance(ABC):
 
     fmi_version: ClassVar[str]
     prefix: ClassVar[str]
+    state_word: ClassVar[str]
     type_names: ClassVar[Mapping[str, str]] = {}
     """Names of types in the names of functions, where they are not those of FMI 3.0."""
 
@@ -80,15 +103,16 @@ class Instance(ABC):
         self.internal_step = 0.0
         self.changed_rounding = False
         self._library = Library(fmu)
-        self._wrap = wrap
+        self.wrap = wrap
         self._pointer = c_void_p()
         self._step_time, self._step_size = c_double(), c_double()
+        self._do_step: Callable[[], int]
 
     # ---- binding ----
 
     def _function(self, name: str, result: Any = ctypes.c_int) -> Function:
         found = self._library.function(self.prefix + name, result)
-        return found if self._wrap is None else self._wrap(self.prefix + name, found)
+        return found if self.wrap is None else self.wrap(self.prefix + name, found)
 
     def _bound(self, name: str, *arguments: Any) -> Callable[[], int]:
         return partial(self._function(name), self._pointer, *arguments)
@@ -213,15 +237,34 @@ class Instance(ABC):
             self._pointer.value = None
 
     def _bind_life(self) -> None:
+        self._enter_initialization = self._function("EnterInitializationMode")
         self._exit_initialization = self._bound("ExitInitializationMode")
         self._terminate = self._bound("Terminate")
         self._reset = self._bound("Reset")
 
     # ---- steps ----
 
-    @abstractmethod
     def step(self, time: float, size: float) -> int:
         """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
+        self._step_time.value = time
+        self._step_size.value = size
+        return self.take_step(self._do_step())
+
+    @abstractmethod
+    def take_step(self, status: int) -> int:
+        """Take what the step just made has returned and said, as `step` does."""
+
+    @abstractmethod
+    def take_time(self, time: float) -> None:
+        """Take where steps have come to that C code has made and found in order, s."""
+
+    @property
+    def step_memory(self) -> dict[str, int]:
+        """Addresses of what a step is given and answers, for C code that makes it."""
+        return {
+            "step_time": ctypes.addressof(self._step_time),
+            "step_size": ctypes.addressof(self._step_size),
+        }
 
     def step_undiscarded(self, time: float, size: float) -> None:
         """Advance from `time` by `size`, s; a step that the FMU discards is an error."""
@@ -253,10 +296,10 @@ class Instance(ABC):
 
     # ---- states ----
 
-    def _bind_states(self, what: str) -> None:
-        """Bind the functions of saved states; `what` is FMI's word for one, which its versions write differently."""
-        self._get_state, self._set_state = self._function(f"Get{what}"), self._function(f"Set{what}")
-        self._free_state = f"Free{what}"
+    def _bind_states(self) -> None:
+        self._get_state = self._function(f"Get{self.state_word}")
+        self._set_state = self._function(f"Set{self.state_word}")
+        self._free_state = f"Free{self.state_word}"
 
     def free_state(self, slot: c_void_p) -> None:
         """Give a saved state's memory back."""

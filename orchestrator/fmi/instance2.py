@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int, c_void_p
 from pathlib import Path
 
@@ -45,6 +44,7 @@ class Instance2(Instance):
 
     fmi_version = "2.0"
     prefix = "fmi2"
+    state_word = "FMUstate"
     type_names = FMI2_NAMES
     event_mode = False
 
@@ -66,8 +66,8 @@ class Instance2(Instance):
             self._instantiate()
         self._keep_rounding()
         self._bind_life()
-        self._do_step: Callable[[], int] = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
-        self._bind_states("FMUstate")
+        self._do_step = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
+        self._bind_states()
 
     def _instantiate(self) -> None:
         instantiate = self._function("Instantiate", c_void_p)
@@ -110,13 +110,11 @@ class Instance2(Instance):
         no, zero = c_int(0), c_double(0.0)
         setup = self._function("SetupExperiment")
         self.check(setup(self._pointer, no, zero, c_double(start_time), no, zero), "SetupExperiment")
-        self.check(self._function("EnterInitializationMode")(self._pointer), "EnterInitializationMode")
+        self.check(self._enter_initialization(self._pointer), "EnterInitializationMode")
 
-    def step(self, time: float, size: float) -> int:
-        """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
-        self._step_time.value = time
-        self._step_size.value = size
-        status = self._do_step()
+    def take_step(self, status: int) -> int:
+        """Take what the step just made has returned and said, as `step` does."""
+        end = self._step_time.value + self._step_size.value
         if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
             self._keep_rounding()
         self.wants_to_end = self.is_flagged = False
@@ -126,10 +124,15 @@ class Instance2(Instance):
             if not self._wants_to_end():
                 return status
             self.wants_to_end = self.is_flagged = True
-            self.time = self._end_told(time + size)
+            self.time = self._end_told(end)
             return OK
-        self.time = time + size
+        self.time = end
         return status
+
+    def take_time(self, time: float) -> None:
+        """Take where steps have come to that C code has made and found in order, s."""
+        self.time = time
+        self.wants_to_end = self.is_flagged = False
 
     def _wants_to_end(self) -> bool:
         """Does the FMU ask for the end of the simulation by a step that it has discarded?"""

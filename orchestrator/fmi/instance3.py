@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from ctypes import c_bool, c_char_p, c_double, c_size_t, c_uint16, c_uint32, c_void_p
-from functools import partial
 
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Instance, Wrapper
@@ -38,6 +36,7 @@ class Instance3(Instance):
 
     fmi_version = "3.0"
     prefix = "fmi3"
+    state_word = "FMUState"
 
     def __init__(
         self,
@@ -56,7 +55,7 @@ class Instance3(Instance):
         self._keep_rounding()
         self._bind_life()
         self._bind_events()
-        self._bind_states("FMUState")
+        self._bind_states()
 
     def _instantiate(self) -> None:
         instantiate = self._function("InstantiateCoSimulation", c_void_p)
@@ -84,34 +83,41 @@ class Instance3(Instance):
         self._last_time = c_double()
         outputs = [ctypes.byref(flag) for flag in (self._needs_event, self._ends, self._early)]
         outputs.append(ctypes.byref(self._last_time))
-        self._do_step: Callable[[], int] = self._bound(
-            "DoStep", self._step_time, self._step_size, c_bool(False), *outputs
-        )
+        self._do_step = self._bound("DoStep", self._step_time, self._step_size, c_bool(False), *outputs)
 
     def enter_initialization(self, start_time: float) -> None:
         """Enter initialization mode at `start_time`, s."""
         self.time = start_time
-        enter = partial(self._function("EnterInitializationMode"), self._pointer)
         no, zero = c_bool(False), c_double(0.0)
-        self.check(enter(no, zero, c_double(start_time), no, zero), "EnterInitializationMode")
+        status = self._enter_initialization(self._pointer, no, zero, c_double(start_time), no, zero)
+        self.check(status, "EnterInitializationMode")
 
-    def step(self, time: float, size: float) -> int:
-        """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
-        self._step_time.value = time
-        self._step_size.value = size
-        status = self._do_step()
+    def take_step(self, status: int) -> int:
+        """Take what the step just made has returned and said, as `step` does."""
         if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
             self._keep_rounding()
         if status and status != DISCARD:
             self.check(status, "DoStep")
-        reached = self.time = self._last_time.value
+        reached = self._last_time.value
+        self.take_time(reached)
+        end = self._step_time.value + self._step_size.value
+        if reached != end and status != DISCARD:
+            self._check_end(reached, end)
+        return status
+
+    def take_time(self, time: float) -> None:
+        """Take where steps have come to that C code has made and found in order, s."""
+        self.time = time
         if self._flags.value:
             self._take_flags()
         elif self.is_flagged:
             self.returned_early = self.needs_event_mode = self.wants_to_end = self.is_flagged = False
-        if reached != time + size and status != DISCARD:
-            self._check_end(reached, time + size)
-        return status
+
+    @property
+    def step_memory(self) -> dict[str, int]:
+        """Addresses of what a step is given and answers, for C code that makes it."""
+        answers = {"last_time": ctypes.addressof(self._last_time), "flags": ctypes.addressof(self._flags)}
+        return super().step_memory | answers
 
     def _check_end(self, reached: float, end: float) -> None:
         """Refuse a step that has not ended where it was to, unless it has returned early or asks for the end.

@@ -68,6 +68,11 @@ class VariableGroup:
         self.get_call: Call = partial(functions[0], *arguments)
         self.set_call: Call = partial(functions[1], *arguments)
 
+    @property
+    def references_address(self) -> int:
+        """Where the value references are, for C code that makes the calls itself."""
+        return ctypes.addressof(self._array)
+
     def get(self) -> NDArray[Any]:
         """Read the variables; returns the buffer."""
         status = self.get_call()

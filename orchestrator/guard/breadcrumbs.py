@@ -2,7 +2,8 @@
 
 They lie in a file that two processes map. When an FMU takes its process down, or hangs, the other process reads
 what it was doing. The call is noted either before every call, which is exact and takes a quarter of the time of
-an impact, or by looking at the frames of the running thread now and then, which tells what hangs and costs nothing.
+an impact where Python makes the calls (in C it is a store), or by looking at the frames of the running thread now
+and then, which tells what hangs and costs nothing.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from vibroimpact.orchestrator.fmi.instance import Instance, Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.fmi.log import RING_SIZE, LogTail
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.plain_loop import PlainLoop
 from vibroimpact.orchestrator.importer.wiring import CallList
 
 MOST_COMPONENTS = 32
@@ -91,12 +93,20 @@ class Breadcrumbs:
     def wrap(self, component: str) -> Wrapper:
         """Return what wraps the functions of a component: each call is noted before it is made."""
 
-        def wrapper(name: str, function: Function) -> Function:
-            number = self._register(component, name)
-            noting = self._noting_step if name.endswith("DoStep") else self._noting
-            return noting(number, function)
+        return _ComponentNotes(self, component)
 
-        return wrapper
+    def noted(self, component: str, name: str, function: Function) -> Function:
+        """Return a component's function, noted before it is called."""
+        noting = self._noting_step if name.endswith("DoStep") else self._noting
+        return noting(self.number_of(component, name), function)
+
+    def address_of(self, field: str) -> int:
+        """Return where `call` and `time` are noted, for C code that makes calls itself."""
+        return ctypes.addressof(self._notes) + int(getattr(_Notes, field).offset)
+
+    def number_of(self, component: str, name: str) -> int:
+        """Return the number that a component's function is noted by."""
+        return self._register(component, name)
 
     def _register(self, component: str, name: str) -> int:
         notes = self._notes
@@ -133,9 +143,9 @@ class Breadcrumbs:
         while frame is not None:
             found = _call_in(frame)
             if found is not None:
-                instance, function = found
+                instance, function, time = found
                 number = self._register(instance.name, instance.prefix + function)
-                self._notes.time = _time_of(instance, function)
+                self._notes.time = time
                 self._notes.call = number
                 return
             frame = frame.f_back
@@ -163,6 +173,21 @@ class Breadcrumbs:
         return self._tail(self._notes.owners[index]).take() if index >= 0 else ()
 
 
+class _ComponentNotes:
+    """Wraps the functions of one component: each call is noted before it is made, by C code as well (`CallNotes`)."""
+
+    def __init__(self, notes: Breadcrumbs, component: str) -> None:
+        self._notes, self._component = notes, component
+        self.call_address, self.time_address = notes.address_of("call"), notes.address_of("time")
+
+    def __call__(self, name: str, function: Function) -> Function:
+        return self._notes.noted(self._component, name, function)
+
+    def number_of(self, name: str) -> int:
+        """Return the number that a function is noted by."""
+        return self._notes.number_of(self._component, name)
+
+
 def _time_of(instance: Instance, function: str) -> float:
     """Time of a call, s; NaN for one before which no run has begun."""
     if function == METHODS["_instantiate"]:
@@ -170,9 +195,16 @@ def _time_of(instance: Instance, function: str) -> float:
     return instance.step_start if function == METHODS["step"] else instance.time
 
 
-def _call_in(frame: FrameType) -> tuple[Instance, str] | None:
-    """Instance and function of the FMI call that a frame makes, if it makes one."""
+def _call_in(frame: FrameType) -> tuple[Instance, str, float] | None:
+    """Instance, function and time (s) of the FMI call that a frame makes, if it makes one."""
     owner, method = frame.f_locals.get("self"), frame.f_code.co_name
+    if isinstance(owner, PlainLoop) and method == "advance":
+        return owner.call_under_way()
+    found = _python_call_in(frame, owner, method)
+    return None if found is None else (*found, _time_of(*found))
+
+
+def _python_call_in(frame: FrameType, owner: object, method: str) -> tuple[Instance, str] | None:
     if isinstance(owner, Instance) and method in METHODS:
         return owner, METHODS[method]
     if isinstance(owner, VariableGroup) and method in ("get", "set"):

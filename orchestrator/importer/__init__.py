@@ -11,6 +11,6 @@ Any set of co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step of 
 - FMUs without states are stepped last, once the end of the step is agreed.
 
 `specification` says what an importer is made of, `component` is one FMU in it, `wiring` moves values between them and
-solves algebraic loops, `order` says who is stepped first, `master` steps them, `events` resolves events, `sampling`
-and `energy` watch without disturbing.
+solves algebraic loops, `order` says who is stepped first, `step_plan` what a step must do, `master` steps them,
+`plain_loop` makes plain steps in C, `events` resolves events, `sampling` and `energy` watch without disturbing.
 """

@@ -80,6 +80,11 @@ class ContactBonds:
         for bond, contact in zip(self.held, contacts, strict=True):
             bond.given_mass = contact.mass
 
+    @property
+    def have_no_say(self) -> bool:
+        """Does no contact of the run need anything but the values that connections carry?"""
+        return not (self._following or self.held or self.pairs.pairs)
+
     def begin(self, time: float) -> None:
         """Start a run at `time`, s: initialization has ended."""
         for bond in self._all():

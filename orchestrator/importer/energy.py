@@ -11,6 +11,7 @@ that holds its force has it from its bond (`held_force`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Container, Sequence
 from itertools import pairwise
 
@@ -103,6 +104,11 @@ class _Contact:
             "Float64", [f"{port}.{x}" for x in ("displacement", "velocity", "force")]
         )
         self.residual = 0.0
+
+    @property
+    def follows(self) -> bool:
+        """Does the body follow the force of the stop, in this run?"""
+        return self._bond.follows
 
     def begin(self, gain: float) -> None:
         self.residual = 0.0
@@ -212,7 +218,7 @@ class InterfaceEnergy:
         self._connections = [watched for _, watched in found]
         self._specs = [connection for connection, _ in found]
         if found or self._begun:
-            importer.watchers.append(StepWatcher(self._before, self._after))
+            importer.watchers.append(StepWatcher(self._before, self._after, self._patience))
 
     def begin(self, connections: Sequence[ConnectionSpec]) -> None:
         """Start a run; the gains are those of `connections`, which are the same ones otherwise."""
@@ -235,6 +241,11 @@ class InterfaceEnergy:
         """Give back saved states, before the components are freed."""
         for contact in self._plain:
             contact.free()
+
+    def _patience(self) -> float:
+        """Nothing is to be seen where there are contacts alone, of which none presses its stop in."""
+        is_idle = all(isinstance(c, _Contact) and not c.follows for c in self._connections)
+        return math.inf if is_idle and not self._begun else 0.0
 
     def _before(self, time: float) -> None:
         for watched in self._connections:

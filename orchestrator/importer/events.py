@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Instance
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
@@ -26,10 +29,39 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class StepWatcher:
-    """Looks on at steps: called before a step with (time), after it with (time, end)."""
+    """Looks on at steps: called before a step with (time), after it with (time, end).
+
+    Attributes
+    ----------
+    patience : callable or None
+        Returns the seconds of wall time for which steps may pass unseen, the last of which it may see the end of;
+        None: it looks at every step.
+    """
 
     before: Callable[[float], None]
     after: Callable[[float, float], None]
+    patience: Callable[[], float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LateEvents:
+    """Hears of events that have passed; those beyond its room are told when they happen, by `on_event`.
+
+    Attributes
+    ----------
+    room : callable
+        Returns how many of the next events may pass before it hears of them.
+    tell : callable
+        Called with events that have passed, shape (event, 3): time (s), index among those at the same time, and the
+        place of the component in `Importer.components`.
+    """
+
+    room: Callable[[], int]
+    tell: Callable[[NDArray[np.float64]], None]
+
+
+#: No event may pass: each is told when it happens.
+NO_EVENTS = LateEvents(lambda: 0, lambda events: None)
 
 
 class EventMode:
@@ -41,23 +73,30 @@ class EventMode:
         All of an importer; those of FMI 3.0 with event mode take part in it.
     transfers, behind : sequence of Transfer
         All of an importer, and those that a component's own step has not been preceded by.
+
+    Attributes
+    ----------
+    instances : list of Instance3
+        Those that take part.
+    begin, again, leave : CallList
+        The calls into event mode, those of one more iteration, and those back to step mode.
     """
 
     def __init__(
         self, components: Sequence[Component], transfers: Sequence[Transfer], behind: Sequence[Transfer]
     ) -> None:
         with_events = [c.instance for c in components if c.event_mode]
-        self._instances = [i for i in with_events if isinstance(i, Instance3)]
-        enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in self._instances]
-        update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in self._instances]
-        leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in self._instances]
+        self.instances = [i for i in with_events if isinstance(i, Instance3)]
+        enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in self.instances]
+        update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in self.instances]
+        leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in self.instances]
         # at its event a component's inputs from those stepped before it are those of that instant already
         first = [call for t in behind if _takes_events(t.target) for call in t.calls()]
         again = [call for t in transfers if _takes_events(t.target) for call in t.calls()]
-        self._begin = CallList([*enter, *first, *update])
+        self.begin = CallList([*enter, *first, *update])
         self._begin_run = CallList([*first, *update])  # initialization ends in event mode
-        self._again = CallList([*again, *update])
-        self._leave = CallList(leave)
+        self.again = CallList([*again, *update])
+        self.leave = CallList(leave)
 
     def resolve(self, time: float) -> bool:
         """Resolve the events at `time`, s; returns whether a component asks for the end.
@@ -67,33 +106,34 @@ class EventMode:
         ComponentError
             A component fails, or never settles.
         """
-        self._begin()
+        self.begin()
         ends = False
-        for instance in self._instances:
+        for instance in self.instances:
             if instance.decisions.value:
                 ends = self._iterate(time)
                 break
-        self._leave()
+        self.leave()
         return ends
 
     def begin_run(self, time: float) -> bool:
         """Leave the event mode that initialization ends in, as `resolve` does."""
-        if not self._instances:
+        if not self.instances:
             return False
         self._begin_run()
         ends = self._iterate(time)
-        self._leave()
+        self.leave()
         return ends
 
     def _iterate(self, time: float) -> bool:
         for _ in range(EVENT_ITERATIONS):
-            if not any(instance.needs_update.value for instance in self._instances):
-                return any(instance.event_wants_to_end for instance in self._instances)
-            self._again()
-        raise self._endless(time)
+            if not any(instance.needs_update.value for instance in self.instances):
+                return any(instance.event_wants_to_end for instance in self.instances)
+            self.again()
+        raise self.endless_error(time)
 
-    def _endless(self, time: float) -> ComponentError:
-        endless = [i for i in self._instances if i.needs_update.value]
+    def endless_error(self, time: float) -> ComponentError:
+        """Return the error of events that do not settle at `time`, s."""
+        endless = [i for i in self.instances if i.needs_update.value]
         names = ", ".join(i.name for i in endless)
         return ComponentError(
             f"{names}: fmi3UpdateDiscreteStates: expected event iteration to end, got another request after "

@@ -5,20 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
+from vibroimpact.fmus.core.coupling import CouplingEnd
+from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.beginning import settle_connections
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, Value
 from vibroimpact.orchestrator.importer.contact_bond import MOST_REPETITIONS
 from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS, ContactBonds
 from vibroimpact.orchestrator.importer.events import (
+    NO_EVENTS,
     Event,
-    EventMode,
+    LateEvents,
     StepWatcher,
-    macro_step_error,
     standstill_error,
 )
-from vibroimpact.orchestrator.importer.order import fresh_inputs, stepping_order
+from vibroimpact.orchestrator.importer.order import stepping_order
+from vibroimpact.orchestrator.importer.plain_loop import MOST_SECONDS, Made, PlainLoop
+from vibroimpact.orchestrator.importer.progress import Progress
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
@@ -28,14 +31,9 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
+from vibroimpact.orchestrator.importer.step_plan import Parts, StepPlan
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
-from vibroimpact.orchestrator.importer.wiring import (
-    LoopSolver,
-    SettlingInputs,
-    moves_of,
-    order_of,
-    transfers_of,
-)
+from vibroimpact.orchestrator.importer.wiring import LoopSolver, SettlingInputs, order_of, transfers_of
 
 #: Steps without progress before the run is given up.
 STANDSTILLS = 100
@@ -86,6 +84,10 @@ class Importer:
         Communication steps made, and how many of them were repeated.
     on_event, on_pause : callable or None
         Called at each event with it; called when a component ended a step early without an event.
+    late_events : LateEvents or None
+        Hears, in place of `on_event`, of events that may pass; None: `on_event` is called at each.
+    steps_in_c : bool
+        Steps that are plain are made in C, to the same bits as here.
     """
 
     def __init__(
@@ -113,7 +115,6 @@ class Importer:
                 events=spec.name not in watched,
             )
         self.macro_step = macro_step
-        self.exchange = exchange
         self.watches = [Watch(self.components[event.component], event) for event in events]
         tuning = [c for c in connections if is_tunable(c, self.components)]
         connections = [c for c in connections if c not in tuning]
@@ -129,49 +130,44 @@ class Importer:
             component.watch_inputs(variable for owner, variable in fed if owner == name)
         self._looping = [t for t in self.transfers if order.loops_back(t.connections[0])]
         self._order = stepping_order(self.components, connections)
-        self._plan()
+        parts = Parts(
+            self._order,
+            {name: number for number, name in enumerate(self.components)},
+            self.transfers,
+            self._looping,
+            self.loops,
+            self.watches,
+            self.contacts,
+            self.tuning,
+        )
+        self._progress = Progress()
+        self._plan = StepPlan(parts, exchange, self._progress)
         self.watchers: list[StepWatcher] = []
         self.keeps_start = False
+        self.steps_in_c = True
         self.on_event: Callable[[Event], None] | None = None
+        self.late_events: LateEvents | None = None
         self.on_pause: Callable[[], None] | None = None
         self._begun = False
-        self.time = 0.0
 
-    def _plan(self) -> None:
-        """Decide once what a step must do."""
-        sources = [c for c in self._order if c.event_mode or self._is_looked_at(c)]
-        alone = len(sources) == 1 and sources[0] is self._order[0] and sources[0].event_mode
-        self._iterates = self.exchange == "iterated"
-        self._saves = self._iterates or not (alone or not sources)
-        self._prepares = self._saves or bool(self.loops.names)
-        simple = len(self._order) == 1 and not self.transfers and not self.tuning and not self._prepares
-        self._alone = self._order[0] if simple and self._bare_step(self._order[0]) else None
-        self._saved = [c for c in self._order if c.has_states]
-        self._incoming = {c.name: [t for t in self.transfers if t.target is c] for c in self._order}
-        self._fresh = fresh_inputs(self._order, self._incoming, jacobi=self.exchange == "jacobi")
-        self.plan_moves()
+    @property
+    def time(self) -> float:
+        """Time reached, s."""
+        return float(self._progress.time)
+
+    @property
+    def steps(self) -> int:
+        """Communication steps made."""
+        return int(self._progress.steps)
+
+    @property
+    def repeated_steps(self) -> int:
+        """How many of them were repeated."""
+        return int(self._progress.repeated_steps)
 
     def plan_moves(self) -> None:
-        """Bind the calls of all paths; again after a transfer's buffers changed."""
-        refreshed = [t for ts in self._fresh.values() for t in ts]
-        behind = [t for t in self.transfers if t not in refreshed]
-        self._start_moves = moves_of(behind) or None
-        self._moves_after_loops = moves_of(t for t in behind if t not in self._looping)
-        paths = [(c, moves_of(self._fresh[c.name]) or None, self._bare_step(c)) for c in self._order]
-        repeats = self._iterates or bool(
-            self.contacts
-        )  # those that cannot go back wait for the last repetition
-        self._paths = [path for path in paths if path[0].has_states or not repeats]
-        self._stateless_paths = [path for path in paths if not path[0].has_states and repeats]
-        self._event_mode = EventMode(self._order, self.transfers, behind)
-
-    def _is_looked_at(self, component: Component) -> bool:
-        """Are its events found from its outputs?"""
-        return component.event_times is not None or any(w.component is component for w in self.watches)
-
-    def _bare_step(self, component: Component) -> Callable[[float, float], int] | None:
-        """The step of a component that says all about it, if there is one."""
-        return None if self._is_looked_at(component) else component.instance.step
+        """Bind the calls of all moves again, after a transfer's buffers changed."""
+        self._plan.plan_moves()
 
     # ---- beginning ----
 
@@ -185,13 +181,8 @@ class Importer:
         values : mapping of (component, variable) to value
             Start values beyond those of the components' specifications.
         """
-        self.time = self._grid_start = start_time
-        self._grid_index = 0
-        self._next_point = start_time + self.macro_step
-        self.steps = self.repeated_steps = 0
+        self._progress.begin(start_time, self.macro_step)
         self.overrun = -math.inf
-        self._event_index, self._event_time = 0, -math.inf
-        self._standstill = 0
         self._at_event: list[Component] = []
         self.wants_to_end = False
         for component in self._order:
@@ -204,7 +195,7 @@ class Importer:
             component.instance.exit_initialization()
         for watch in self.watches:
             watch.begin()
-        self.wants_to_end = self._event_mode.begin_run(start_time)
+        self.wants_to_end = self._plan.event_mode.begin_run(start_time)
         self.contacts.begin(start_time)
         self._note(self.contacts.pairs.resolve(start_time))
         self._tune(start_time)
@@ -219,121 +210,135 @@ class Importer:
         ComponentError
             A component fails, never settles at an event, or makes no progress.
         """
+        now = self._progress
         while not self.wants_to_end:
-            time = self.time
+            time = now.time
             room = SAME_INSTANT * (1.0 + abs(time))
             if end - time <= room:
-                if end > time:
-                    self.time = end
+                now.time = max(time, end)
                 return
-            if self._next_point - time <= room:
-                self._pass_point(room)
-            if self._alone is not None and self._next_point < end and not (self.watchers or self.keeps_start):
-                self._glide(self._alone, time, end)
-                continue
-            self._step(time, self._next_point if self._next_point < end else end)
+            if now.next_point - time <= room:
+                now.pass_point(self.macro_step, room)
+            seconds = self._seconds_for_c()
+            if seconds > 0.0 and (loop := self._plan.plain_loop) is not None:
+                self._make_plain_steps(loop, end, seconds)
+            else:
+                self._step(time, min(now.next_point, end))
 
-    def _pass_point(self, room: float) -> None:
-        """Find the next communication point, a multiple of the macro step."""
-        if self.macro_step <= room:
-            raise macro_step_error(self.macro_step, room, self.time)
-        while self._next_point - self.time <= room:
-            self._grid_index += 1
-            self._next_point = self._grid_start + (self._grid_index + 1) * self.macro_step
+    # ---- plain steps ----
 
-    def _glide(self, component: Component, time: float, end: float) -> None:
-        """Whole macro steps of a single component, for as long as it has nothing to say."""
-        instance, step, point = component.instance, component.instance.step, self._next_point
-        start, macro_step, index = self._grid_start, self.macro_step, self._grid_index
-        first = index
-        while point < end:
-            status = step(time, point - time)
-            if status != OK or instance.is_flagged:
-                self.time, self._grid_index, self._next_point = time, index, point
-                self.steps += index - first
-                self._step(time, point, status)
-                return
-            time = point
-            index += 1
-            point = start + (index + 1) * macro_step
-        self.time, self._grid_index, self._next_point = time, index, point
-        self.steps += index - first
-        self._at_event, self._standstill = [], 0
+    def _seconds_for_c(self) -> float:
+        """Return the wall time, s, that plain steps in C may take now; 0 where steps are to be made here."""
+        if self.keeps_start or not (self.steps_in_c and self.contacts.have_no_say):
+            return 0.0
+        seconds = MOST_SECONDS
+        for watcher in self.watchers:
+            seconds = 0.0 if watcher.patience is None else min(seconds, watcher.patience())
+        return seconds
 
-    def _step(self, time: float, target: float, made: int | None = None) -> None:
-        """Make a step; `made` is the status of the first component's step where it is made already."""
-        contacts = self.contacts
+    def _make_plain_steps(self, loop: PlainLoop, end: float, seconds: float) -> None:
+        """Make plain steps in C until one is for this class, and finish that one."""
+        late = None if self.on_event is None else self.late_events or NO_EVENTS
+        hears_pauses = self.on_pause is not None
+        came_to = loop.advance(end, self.macro_step, seconds, late, hears_pauses=hears_pauses)
+        run = loop.run
+        self.wants_to_end = bool(run.wants_to_end)
+        if came_to is CouplingEnd.stepped:
+            self._at_event = loop.at_event()
+            overtaken = self._step_all(run.start, run.goal, Made(run.at, run.status))
+            self._finish(run.start, run.target, overtaken)
+        elif came_to is CouplingEnd.reached:
+            self._at_event, self._reached = loop.at_event(), run.reached
+            self._stopper = (self._at_event or self._order)[0]
+            self._conclude(run.start, run.target)
+        elif came_to is CouplingEnd.failed:
+            loop.explain()
+        elif came_to is CouplingEnd.endless:
+            raise self._plan.event_mode.endless_error(self.time)
+
+    # ---- one step ----
+
+    def _step(self, time: float, target: float) -> None:
+        """Make a step towards `target`."""
+        contacts, plan = self.contacts, self._plan
         if contacts:
             target = contacts.begin_step(time, target)
-        if self._start_moves is not None:
-            self._start_moves()
+        if plan.start_moves is not None:
+            plan.start_moves()
         if contacts:
             contacts.apply()
-        if self._prepares or self.keeps_start or contacts.active:
+        if plan.prepares or self.keeps_start or contacts.active:
             self._prepare(time)
         for watcher in self.watchers:
             watcher.before(time)
-        overtaken = self._step_all(time, target, made)
-        if overtaken is not None or self._iterates:
+        self._finish(time, target, self._step_all(time, target))
+
+    def _finish(self, time: float, target: float, overtaken: float | None) -> None:
+        """Finish a step that all have made, or one of them has ended at `overtaken` when others were past it."""
+        contacts = self.contacts
+        if overtaken is not None or self._plan.iterates:
             self._agree(time, overtaken)
         if contacts.active:
             self._settle_contacts(time)
-        if self._stateless_paths and self._reached > time:
+        if self._plan.stateless_paths and self._reached > time:
             contacts.agree(time, self._reached)
             self._step_stateless(time, self._reached)
         if contacts:
             self._at_event += contacts.end_step(self._reached - time)
-        end = self._reached
-        self._standstill = 0 if end > time else self._standstill + 1
-        if self._standstill > STANDSTILLS:
+        self._conclude(time, target)
+
+    def _conclude(self, time: float, target: float) -> None:
+        """All are at the end of a step: count it and resolve its events."""
+        now, end = self._progress, self._reached
+        now.standstill = 0 if end > time else now.standstill + 1
+        if now.standstill > STANDSTILLS:
             raise standstill_error(self._stopper.instance, STANDSTILLS, time)
         for watcher in self.watchers:
             watcher.after(time, end)
-        self.time = end
-        self.steps += 1
+        now.note_step(end)
         if self._at_event:
             for watch in self.watches:
                 watch.confirm()
             self._note(component.name for component in self._at_event)
-            if self._event_mode.resolve(end):
+            if self._plan.event_mode.resolve(end):
                 self.wants_to_end = True
         elif end < target and self.on_pause is not None:
             self.on_pause()
-        if contacts.pairs:
-            self._note(contacts.pairs.resolve(end))
+        if self.contacts.pairs:
+            self._note(self.contacts.pairs.resolve(end))
         self._tune(end)
 
     def _prepare(self, time: float) -> None:
         """What the rarer kinds of step need: loops solved, inputs noted, states saved."""
         if self.loops.names:
             self._solve_loops(time)
-        if self._iterates:
+        if self._plan.iterates:
             for transfer in self.transfers:
                 transfer.note_begin()
-        if self._saves or self.keeps_start or self.contacts.active:
+        if self._plan.saves or self.keeps_start or self.contacts.active:
             self._save_start()
 
     def _solve_loops(self, time: float) -> None:
         self.loops.solve(time)
         for transfer in self._looping:
             transfer.take()
-        self._moves_after_loops()
+        self._plan.moves_after_loops()
 
     def _save_start(self) -> None:
-        for component in self._saved:
+        for component in self._plan.saved:
             component.instance.save(component.at_start)
         for watch in self.watches:
             watch.note_start()
 
     def _restore_start(self) -> None:
-        for component in self._saved:
+        for component in self._plan.saved:
             component.instance.restore(component.at_start)
 
     def _agree(self, time: float, end: float | None) -> None:
         """Repeat a step until all components have reached one instant; `end` is where the first event was met."""
         while end is not None or (end := self._iterate(time)) is not None:
             # somebody met an event earlier than the others went: all go back and step to it
-            self.repeated_steps += 1
+            self._progress.repeated_steps += 1
             if end <= time:
                 self._stay(time)
                 return
@@ -346,40 +351,33 @@ class Importer:
             end = self.contacts.revised_end(time, self._reached)
             if end is None or self._reached <= time:
                 return
-            self.repeated_steps += 1
+            self._progress.repeated_steps += 1
             self._restore_start()
             self.contacts.apply()
             self._save_start()
             overtaken = self._step_all(time, end)
-            if overtaken is not None or self._iterates:
+            if overtaken is not None or self._plan.iterates:
                 self._agree(time, overtaken)
 
-    def _step_all(self, time: float, target: float, made: int | None = None) -> float | None:
+    def _step_all(self, time: float, target: float, made: Made | None = None) -> float | None:
         """Step each component in its order; returns the time of an event that those before it have passed.
 
-        The first component may return early by itself: those after it follow to its event.
+        The first component may return early by itself: those after it follow to its event. Those up to that of `made`
+        have made their steps.
         """
-        if self._at_event:
+        if made is None:
             self._at_event = []
         self.wants_to_end = False  # what a step that was taken back said does not count
-        first = True
-        for component, inputs, step in self._paths:
-            if inputs is not None:
+        place = 0 if made is None else made.place
+        first = place == 0
+        for component, inputs in self._plan.paths[place:]:
+            if inputs is not None and made is None:
                 inputs()
-            if step is not None:
-                # nobody looks for events here but the component itself
-                status = step(time, target - time) if made is None else made
-                if status == OK and not component.instance.is_flagged:
-                    first = False
-                    continue
-                if status == DISCARD:
-                    component.instance.check(status, "DoStep")
-                reached = self._after_step(component, time, target)
-            else:
-                reached = self._step_one(component, time, target)
+            reached = self._step_one(component, time, target, made)
+            made = None
             if reached < target:
                 if not (first and reached > time and (component.event_mode or self.wants_to_end)):
-                    saved = self._saves or self.keeps_start or self.contacts.active
+                    saved = self._plan.saves or self.keeps_start or self.contacts.active
                     if component.instance.wants_to_end and not (saved and component.has_states):
                         self._end_run(time, reached, target)
                         return None
@@ -397,7 +395,7 @@ class Importer:
 
     def _stay(self, time: float) -> None:
         """End the step where it began: no step has size 0, so all but the component at its event go back."""
-        for component, _, _ in self._paths:
+        for component, _ in self._plan.paths:
             if component is self._stopper:
                 break
             if component.has_states:
@@ -407,10 +405,13 @@ class Importer:
             watch.forget()
         self._reached = time
 
-    def _step_one(self, component: Component, time: float, target: float) -> float:
-        """Step one component; returns the time of its first event, or `target`."""
-        component.instance.step_undiscarded(time, target - time)
-        reached = self._after_step(component, time, target)
+    def _step_one(self, component: Component, time: float, target: float, made: Made | None = None) -> float:
+        """Step one component, or take the step that it has made; returns the time of its first event, or `target`."""
+        instance = component.instance
+        status = instance.step(time, target - time) if made is None else instance.take_step(made.status)
+        if status == DISCARD:
+            instance.check(status, "DoStep")
+        reached = self._after_step(component, target) if instance.is_flagged else target
         if component.event_times is not None:
             reached = min(reached, self._reported(component, time, target))
         for watch in self.watches:
@@ -418,7 +419,7 @@ class Importer:
                 reached = min(reached, self._watched(watch, time, target))
         return reached
 
-    def _after_step(self, component: Component, time: float, target: float) -> float:
+    def _after_step(self, component: Component, target: float) -> float:
         """Take what a step has said; returns where it has ended."""
         instance = component.instance
         if instance.wants_to_end:
@@ -454,10 +455,9 @@ class Importer:
 
     def _note(self, components: Iterable[str]) -> None:
         for name in components:
-            self._event_index = self._event_index + 1 if self.time == self._event_time else 0
-            self._event_time = self.time
+            index = self._progress.note_event()
             if self.on_event is not None:
-                self.on_event(Event(self.time, self._event_index, name))
+                self.on_event(Event(self.time, index, name))
 
     def _tune(self, time: float) -> None:
         if self.tuning and self.tuning.resolve(time):
@@ -470,7 +470,7 @@ class Importer:
 
         Returns the time of an event that these inputs make earlier than its end; None without one.
         """
-        if not self._iterates:
+        if not self._plan.iterates:
             return None
         target = self._reached
         inputs = SettlingInputs(self.transfers, STEP_TOLERANCE)
@@ -482,10 +482,10 @@ class Importer:
                 transfer.write_over_step(target - time)
             if self.contacts.active:
                 self.contacts.apply()
-            self.repeated_steps += 1
+            self._progress.repeated_steps += 1
             self._at_event = []
             self.wants_to_end = False
-            for component, _, _ in self._paths:
+            for component, _ in self._plan.paths:
                 reached = self._step_one(component, time, target)
                 if reached < target:
                     self._stopper = component
@@ -495,7 +495,7 @@ class Importer:
 
     def _step_stateless(self, time: float, end: float) -> None:
         """Step the components that no step can be repeated with, once the end of the step is agreed."""
-        for component, inputs, _ in self._stateless_paths:
+        for component, inputs in self._plan.stateless_paths:
             if inputs is not None:
                 inputs()
             reached = self._step_one(component, time, end)

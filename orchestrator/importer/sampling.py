@@ -69,7 +69,7 @@ class Sampler:
         self._probes = [_Probe(importer.components[c], found) for c, found in columns.items()]
         self._values = array("d")
         self._first, self._index, self._end = np.inf, 0, -np.inf
-        importer.watchers.append(StepWatcher(self._before_step, self._after_step))
+        importer.watchers.append(StepWatcher(self._before_step, self._after_step, self._patience))
 
     @property
     def rows(self) -> NDArray[np.float64]:
@@ -91,6 +91,10 @@ class Sampler:
     def _next(self) -> float:
         time = self._first + self._index / self._rate
         return time if time <= self._end + self._room(self._end) else np.inf
+
+    def _patience(self) -> float:
+        """Before it begins, and once all samples are taken, nothing is to be seen."""
+        return np.inf if self._next() == np.inf else 0.0
 
     def _take_now(self, time: float) -> None:
         row = np.empty(self._width)

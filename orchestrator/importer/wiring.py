@@ -91,6 +91,22 @@ class StatusCall:
     call: Callable[[], int]
     instance: Instance
     function: str
+    moved: VariableGroup | Scaling | None = None
+    """What it reads or writes, or converts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """Real numbers times their gains, into another buffer; as a call it returns status 0."""
+
+    read: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    write: NDArray[np.float64]
+
+    def __call__(self) -> int:
+        """Convert."""
+        np.multiply(self.read, self.gains, out=self.write)
+        return 0
 
 
 class Transfer:
@@ -123,12 +139,7 @@ class Transfer:
     def _converter(self) -> Callable[[], int]:
         read, write, gains = self.read.values, self.write.values, self._gains
         if self.kind == "Float64" and write.dtype == np.float64:
-
-            def scale() -> int:
-                np.multiply(read, gains, out=write)
-                return 0
-
-            return scale
+            return Scaling(read, gains, write)
 
         def convert() -> int:
             np.multiply(read, gains, out=write, casting="unsafe")
@@ -219,11 +230,12 @@ class Transfer:
     def calls(self) -> list[StatusCall]:
         """Return the bare calls of a move, for a path that checks their status itself."""
         source, target = self.source.instance, self.target.instance
-        middle = [] if self.convert is None else [StatusCall(self.convert, target, "convert")]
+        scaling = self.convert if isinstance(self.convert, Scaling) else None
+        middle = [] if self.convert is None else [StatusCall(self.convert, target, "convert", scaling)]
         return [
-            StatusCall(self.read.get_call, source, f"Get{self.read.name}"),
+            StatusCall(self.read.get_call, source, f"Get{self.read.name}", self.read),
             *middle,
-            StatusCall(self.write.set_call, target, f"Set{self.write.name}"),
+            StatusCall(self.write.set_call, target, f"Set{self.write.name}", self.write),
         ]
 
 
@@ -264,13 +276,19 @@ def equal_values(a: NDArray[Any], b: NDArray[Any], tolerance: float) -> bool:
 
 
 class CallList:
-    """Bare calls made one after the other; the first bad status raises its instance's error."""
+    """Bare calls made one after the other; the first bad status raises its instance's error.
 
-    __slots__ = ("_bare", "_calls")
+    Attributes
+    ----------
+    calls : tuple of StatusCall
+        The calls.
+    """
+
+    __slots__ = ("_bare", "calls")
 
     def __init__(self, calls: Iterable[StatusCall]) -> None:
-        self._calls = tuple(calls)
-        self._bare = tuple(c.call for c in self._calls)
+        self.calls = tuple(calls)
+        self._bare = tuple(c.call for c in self.calls)
 
     def __call__(self) -> None:
         """Make the calls."""
@@ -285,7 +303,7 @@ class CallList:
 
     def find(self, call: object) -> StatusCall | None:
         """Return what is known of one of the calls; None when it is not among them."""
-        return next((c for c in self._calls if c.call is call), None)
+        return next((c for c in self.calls if c.call is call), None)
 
     def _explain(self, call: Callable[[], int], status: int) -> None:
         found = self.find(call)

@@ -8,11 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vibroimpact.fmus import fmu_path
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import Value, description_of
-from vibroimpact.orchestrator.importer.events import Event
+from vibroimpact.orchestrator.importer.events import Event, LateEvents
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
 from vibroimpact.orchestrator.run.record import ImpactLimitReached, RecordedBody
@@ -116,6 +119,7 @@ class CoupledDriver(RecordedBody):
         joined = [*connections_of(stops), *connections]
         self.importer = Importer(specs, joined, macro_step=macro_step, exchange=exchange, wrap=wrap)
         self.importer.on_event = self._count_event
+        self.importer.late_events = LateEvents(self._uncounted, self._count_late)
         self.importer.on_pause = self._make_room
         self._stop_floats = stop_parameters(stops, floats)
         super().__init__(self._group)
@@ -158,6 +162,13 @@ class CoupledDriver(RecordedBody):
         """Empty the record; the body pauses when it is full, and after some hundredths of a second of work."""
         self.take_rows()
         self._deadline.refuse_late()
+
+    def _uncounted(self) -> int:
+        """Return how many events may pass until the record is to be emptied, or the run to end."""
+        return min(IMPACTS_PER_BLOCK - 1 - self._events % IMPACTS_PER_BLOCK, self._limit - self._events)
+
+    def _count_late(self, events: NDArray[np.float64]) -> None:
+        self._events += len(events)
 
     def _count_event(self, event: Event) -> None:
         self._events += 1

@@ -7,13 +7,14 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
-from vibroimpact.orchestrator.importer.events import Event
+from vibroimpact.orchestrator.importer.events import Event, LateEvents
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
 from vibroimpact.orchestrator.run.record import (
@@ -85,6 +86,7 @@ class GeneralRunner:
         )
         self._names = tuple(self._importer.components)
         self._importer.on_event = self._note_event
+        self._importer.late_events = LateEvents(lambda: self._limit - self._seen, self._note_late)
         self._importer.on_pause = self._deadline.refuse_late
         self._importer.watchers.append(self._deadline.watcher)
         self._energy = InterfaceEnergy(self._importer, general.connections)
@@ -213,6 +215,11 @@ class GeneralRunner:
             )
 
     # ---- what happens during a run ----
+
+    def _note_late(self, events: NDArray[np.float64]) -> None:
+        self._seen += len(events)
+        if self._recording:
+            self._events += [(time, int(index), int(place) + 1) for time, index, place in events.tolist()]
 
     def _note_event(self, event: Event) -> None:
         self._seen += 1

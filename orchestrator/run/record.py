@@ -74,7 +74,7 @@ class Deadline:
     @property
     def watcher(self) -> StepWatcher:
         """What looks on at the steps of an importer."""
-        return StepWatcher(self.look_on, lambda time, end: None)
+        return StepWatcher(self.look_on, lambda time, end: None, lambda: self._end - time.perf_counter())
 
 
 def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,12 +6,15 @@ import ctypes
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
-from support.coupled_parts import P11, body
+from support.coupled_parts import P11, body, contact, external, stop
 
+from vibroimpact.fmus.core.coupling import CouplingEnd, advance_coupled
 from vibroimpact.orchestrator.fmi.log import callback
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
+from vibroimpact.orchestrator.importer import plain_loop
 from vibroimpact.orchestrator.importer.master import Importer
 
 
@@ -80,3 +83,41 @@ def test_the_frames_of_a_thread_show_the_call_that_it_is_in(
         instance.step(time, 0.5)
     importer.free()
     assert [(name, function) for name, function, _ in seen] == [("b", "fmi3DoStep")] * 2
+
+
+def test_calls_made_in_c_are_noted_as_those_of_python(notes: tuple[Breadcrumbs, Breadcrumbs]) -> None:
+    writer, reader = notes
+    last = []
+    for in_c in (True, False):
+        parts = [body("b", {**P11, **external(1.0)}), stop("s")]
+        importer = Importer(parts, contact("b", "s"), wrap=writer.wrap)
+        importer.steps_in_c = in_c
+        importer.begin()
+        for end in (7.0, 25.0):
+            reader.begin()
+            importer.advance(end)
+            last.append(reader.last_call())
+        importer.free()
+    assert last[:2] == last[2:]
+    assert last[0][:2] == ("s", "fmi3DoStep")
+    assert last[0][2] < last[1][2] < 25.0
+
+
+def test_the_frames_of_a_thread_in_c_show_the_call_that_it_is_in(
+    notes: tuple[Breadcrumbs, Breadcrumbs], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer, reader = notes
+    importer = Importer([body("b", {**P11, **external(1.0)}), stop("s")], contact("b", "s"))
+    importer.begin()
+
+    def advance_and_look(*given: Any) -> CouplingEnd:
+        came_to = advance_coupled(*given)
+        writer.note_frame(sys._getframe())  # as another thread sees the last call
+        return came_to
+
+    monkeypatch.setattr(plain_loop, "advance_coupled", advance_and_look)
+    importer.advance(25.0)
+    importer.free()
+    name, function, time = reader.last_call()
+    assert (name, function) == ("s", "fmi3DoStep")
+    assert 18.0 < time < 25.0

@@ -463,6 +463,7 @@ def test_a_bad_status_in_a_prebound_path_names_instance_and_function(
     importer = Importer([body("a", {}), part("g", gain)], [link("a.displacement", "g.u")], macro_step=0.1)
     made.append(importer)
     (transfer,) = importer.transfers
+    importer.steps_in_c = False
     importer.begin()
     transfer.write.set_call = ctypes.CFUNCTYPE(ctypes.c_int)(lambda: 3)
     importer.plan_moves()

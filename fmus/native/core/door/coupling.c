@@ -1,0 +1,337 @@
+#include "door/coupling.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "door/seconds.h"
+
+enum { STATUS_WARNING = 1 };
+/* What a piece of a step comes to, beside VI_COUPLING_*. */
+enum { GO_ON = -1, OVERTAKEN = -2 };
+/* Repetitions of one step; each is to an earlier event. */
+enum { MOST_REPETITIONS = 1000 };
+
+static bool went_well(int status)
+{
+    return status >= 0 && status <= STATUS_WARNING;
+}
+
+/* ---- calls ---- */
+
+static int update(const vi_coupling_call *c)
+{
+    bool *decisions = c->values;
+    bool ignored[3];
+    double next;
+    return c->function.update(c->instance, &decisions[0], &decisions[1], &ignored[0], &ignored[1], &ignored[2], &next);
+}
+
+static int scale(const vi_coupling_call *c)
+{
+    double *values = c->values;
+    for (size_t i = 0; i < c->value_count; ++i) {
+        values[i] = c->from[i] * c->gains[i];
+    }
+    return 0;
+}
+
+static int made(const vi_coupling_plan *plan, const vi_coupling_call *c)
+{
+    *plan->noted_call = c->note;
+    switch (c->kind) {
+    case VI_CALL_MOVE3: return c->function.move3(c->instance, c->references, c->count, c->values, c->value_count);
+    case VI_CALL_MOVE2: return c->function.move2(c->instance, c->references, c->count, c->values);
+    case VI_CALL_UPDATE: return update(c);
+    case VI_CALL_SAVE: return c->function.save(c->instance, c->values);
+    case VI_CALL_RESTORE: return c->function.restore(c->instance, *(void **)c->values);
+    default: return c->function.plain(c->instance);
+    }
+}
+
+static int make_all(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_coupling_calls *calls)
+{
+    for (size_t i = 0; i < calls->count; ++i) {
+        const vi_coupling_call *c = &calls->calls[i];
+        const int status = c->kind == VI_CALL_SCALE ? scale(c) : made(plan, c);
+        if (!went_well(status)) {
+            r->at = c->place;
+            r->status = status;
+            return VI_COUPLING_FAILED;
+        }
+    }
+    return GO_ON;
+}
+
+static int save_all(const vi_coupling_plan *plan, vi_coupling_run *r)
+{
+    int came_to = GO_ON;
+    for (int32_t i = 0; i < plan->count && came_to == GO_ON; ++i) {
+        came_to = make_all(plan, r, &plan->components[i].save);
+    }
+    return came_to;
+}
+
+static int restore_all(const vi_coupling_plan *plan, vi_coupling_run *r)
+{
+    int came_to = GO_ON;
+    for (int32_t i = 0; i < plan->count && came_to == GO_ON; ++i) {
+        came_to = make_all(plan, r, &plan->components[i].restore);
+    }
+    return came_to;
+}
+
+/* ---- the step of one component ---- */
+
+/* An FMU may have changed how its process rounds, or what becomes of subnormal numbers. */
+static bool rounding_is_usual(void)
+{
+    static const volatile double one = 1.0, tiny = 1e-17, smallest = DBL_MIN, half = 0.5;
+    return one + tiny == one - tiny && smallest * half != 0.0;
+}
+
+static int call_step(const vi_coupling_plan *plan, const vi_coupling_component *c)
+{
+    *plan->noted_call = c->step.note;
+    *plan->noted_time = *c->step_time;
+    if (c->step.kind == VI_CALL_STEP2) {
+        return c->step.function.step2(c->step.instance, *c->step_time, *c->step_size, 0);
+    }
+    bool *flags = (bool *)c->flags;
+    return c->step.function.step3(c->step.instance, *c->step_time, *c->step_size, false, &flags[0], &flags[1],
+                                  &flags[2], c->last_time);
+}
+
+/* Take where an FMI 3.0 component says that its step has ended; false where that is not for this loop to judge. */
+static bool take_end(const vi_coupling_plan *plan, vi_coupling_component *c)
+{
+    const double size = *c->step_size, end = *c->step_time + size, reached = *c->last_time;
+    if (reached == end) {
+        c->time = reached;
+        return true;
+    }
+    const double rounding = plan->time_rounding * (1.0 + fabs(end)) + plan->step_rounding * size;
+    const double room = c->internal_step * (1.0 + plan->step_rounding) + rounding;
+    const bool early = c->flags[2] != 0, is_inside = *c->step_time - room <= reached && reached <= end + room;
+    if (!is_inside || (reached < end - room && !(early && c->may_return_early))) {
+        return false;
+    }
+    c->time = reached > end || !early ? end : reached;
+    return true;
+}
+
+/* Take the events that an FMI 2.0 component reports of the step just made; NaN is none. */
+static double reported(const vi_coupling_plan *plan, vi_coupling_component *c, const vi_coupling_run *r, bool *is_there)
+{
+    const double *times = c->event_times.calls->values, goal = r->goal;
+    double first = INFINITY;
+    for (size_t i = 0; i < c->event_times.calls->value_count; ++i) {
+        first = times[i] < first ? times[i] : first;
+    }
+    const double room = plan->same_instant * (1.0 + fabs(goal));
+    if (first > goal + room) {
+        return goal;
+    }
+    if (first >= goal - room || first <= r->start) {
+        c->time = first;
+    }
+    *is_there = first >= goal - room;
+    return *is_there ? goal : first;
+}
+
+/* Step component `i` towards the goal; `reached` is where its first event is, or the goal. */
+static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i, double *reached, bool *has_event)
+{
+    vi_coupling_component *c = &plan->components[i];
+    *reached = r->goal;
+    *has_event = false;
+    *c->step_time = r->start;
+    *c->step_size = r->goal - r->start;
+    r->at = i;
+    r->status = call_step(plan, c);
+    if (!went_well(r->status) || !rounding_is_usual()) {
+        return VI_COUPLING_STEPPED;
+    }
+    if (c->step.kind == VI_CALL_STEP2) {
+        c->time = *c->step_time + *c->step_size;
+        const int came_to = make_all(plan, r, &c->event_times);
+        if (came_to == GO_ON && c->event_times.count > 0) {
+            *reached = reported(plan, c, r, has_event);
+        }
+        return came_to;
+    }
+    if (c->flags[1] != 0 || !take_end(plan, c)) {
+        return VI_COUPLING_STEPPED;
+    }
+    if (c->event_mode) {
+        *has_event = c->flags[0] != 0;
+        *reached = c->flags[2] != 0 ? c->time : r->goal;
+    }
+    return GO_ON;
+}
+
+/* ---- the step of all ---- */
+
+/* Step all towards the goal. The first may end it early, and those after it follow; OVERTAKEN: one of them has met an
+ * earlier event, at `reached`. */
+static int step_all(const vi_coupling_plan *plan, vi_coupling_run *r, bool may_repeat)
+{
+    r->arrived = 0;
+    for (int32_t i = 0; i < plan->count; ++i) {
+        double reached;
+        bool has_event;
+        int came_to = make_all(plan, r, &plan->components[i].inputs);
+        if (came_to == GO_ON) {
+            came_to = step_one(plan, r, i, &reached, &has_event);
+        }
+        if (came_to != GO_ON) {
+            return came_to;
+        }
+        if (reached < r->goal) {
+            const bool ends_it = i == 0 && reached > r->start && plan->components[i].event_mode;
+            if (!ends_it && !(may_repeat && reached > r->start)) {
+                return VI_COUPLING_STEPPED;
+            }
+            if (!ends_it) {
+                r->reached = reached;
+                return OVERTAKEN;
+            }
+            r->goal = reached;
+        }
+        if (has_event) {
+            r->at_event[r->arrived++] = i;
+        }
+    }
+    r->reached = r->arrived > 0 ? plan->components[r->at_event[0]].time : r->goal;
+    return GO_ON;
+}
+
+/* Step all to the first event of any. */
+static int step_together(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
+{
+    r->goal = r->target;
+    for (int k = 0; k < MOST_REPETITIONS; ++k) {
+        int came_to = step_all(plan, r, plan->saves && k + 1 < MOST_REPETITIONS);
+        if (came_to != OVERTAKEN) {
+            return came_to;
+        }
+        p->repeated_steps += 1;
+        r->goal = r->reached;
+        came_to = restore_all(plan, r);
+        if (came_to != GO_ON) {
+            return came_to;
+        }
+    }
+    return VI_COUPLING_STEPPED;
+}
+
+/* ---- events ---- */
+
+static bool any_decision(const vi_coupling_plan *plan, int which)
+{
+    for (int32_t i = 0; i < plan->deciding; ++i) {
+        if (plan->decisions[i][which] != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Carry values and update discrete states until all are settled. */
+static int resolve(const vi_coupling_plan *plan, vi_coupling_run *r)
+{
+    int came_to = make_all(plan, r, &plan->begin);
+    for (int32_t k = 1; came_to == GO_ON && any_decision(plan, 0); ++k) {
+        came_to = make_all(plan, r, &plan->again);
+        if (came_to == GO_ON && k == plan->most_iterations) {
+            return VI_COUPLING_ENDLESS;
+        }
+    }
+    if (came_to == GO_ON && any_decision(plan, 1)) {
+        r->wants_to_end = 1;
+    }
+    return came_to == GO_ON ? make_all(plan, r, &plan->leave) : came_to;
+}
+
+static void note(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
+{
+    for (int32_t k = 0; k < r->arrived; ++k) {
+        p->event_index = p->time == p->event_time ? p->event_index + 1 : 0;
+        p->event_time = p->time;
+        if (r->events != NULL) {
+            double *row = r->events + 3 * r->events_used;
+            row[0] = p->time;
+            row[1] = (double)p->event_index;
+            row[2] = (double)plan->components[r->at_event[k]].number;
+            r->events_used += 1;
+        }
+    }
+}
+
+/* ---- the run ---- */
+
+static int finish(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
+{
+    const bool has_room = r->events == NULL || r->events_used + r->arrived <= r->events_room;
+    const bool pauses = r->arrived == 0 && r->reached < r->target && r->hears_pauses;
+    if (!(r->reached > r->start) || !has_room || pauses) {
+        return VI_COUPLING_REACHED;
+    }
+    p->time = r->reached;
+    p->standstill = 0;
+    p->steps += 1;
+    if (r->arrived == 0) {
+        return GO_ON;
+    }
+    note(plan, p, r);
+    return resolve(plan, r);
+}
+
+static int step(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
+{
+    r->start = p->time;
+    r->target = p->next_point < r->end ? p->next_point : r->end;
+    int came_to = make_all(plan, r, &plan->start);
+    if (came_to == GO_ON && plan->saves) {
+        came_to = save_all(plan, r);
+    }
+    if (came_to == GO_ON) {
+        came_to = step_together(plan, p, r);
+    }
+    return came_to == GO_ON ? finish(plan, p, r) : came_to;
+}
+
+/* Find the next communication point, a multiple of the macro step that lies ahead. */
+static bool pass_point(const vi_coupling_run *r, vi_coupling_progress *p, double room)
+{
+    if (r->macro_step <= room) {
+        return false;
+    }
+    while (p->next_point - p->time <= room) {
+        p->grid_index += 1;
+        p->next_point = p->grid_start + (double)(p->grid_index + 1) * r->macro_step;
+    }
+    return true;
+}
+
+VI_DOOR int vi_door_coupling(const vi_coupling_plan *plan, vi_coupling_progress *progress, vi_coupling_run *run)
+{
+    const double call = vi_seconds_now();
+    while (!run->wants_to_end) {
+        const double time = progress->time, room = plan->same_instant * (1.0 + fabs(time));
+        if (run->end - time <= room) {
+            progress->time = run->end > time ? run->end : time;
+            return VI_COUPLING_DONE;
+        }
+        if (progress->next_point - time <= room && !pass_point(run, progress, room)) {
+            return VI_COUPLING_LISTEN;
+        }
+        const int came_to = step(plan, progress, run);
+        if (came_to != GO_ON) {
+            return came_to;
+        }
+        if (vi_seconds_since(call) >= run->most_seconds) {
+            return VI_COUPLING_LISTEN;
+        }
+    }
+    return VI_COUPLING_DONE;
+}

@@ -1,0 +1,261 @@
+"""The plain steps of an importer, in C: from event to event by the FMUs' own functions.
+
+A step is plain where nothing but components and connections has a say in it. What it comes to otherwise (a call that
+failed, a component that asks for the end, an event to be heard at once) is left to `master`, which is the reference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from ctypes import addressof, c_double, c_int32, c_int64, c_void_p
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibroimpact.fmus.core.coupling import (
+    CallKind,
+    CouplingCall,
+    CouplingCalls,
+    CouplingComponent,
+    CouplingEnd,
+    CouplingPlan,
+    CouplingProgress,
+    CouplingRun,
+    advance_coupled,
+)
+from vibroimpact.orchestrator.fmi.instance import STEP_ROUNDING, TIME_ROUNDING, CallNotes, Instance
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
+from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS, EventMode, LateEvents
+from vibroimpact.orchestrator.importer.wiring import CallList, Scaling, StatusCall
+
+#: Longest wall time of one call, s: signals and deadlines are heard between two.
+MOST_SECONDS = 0.05
+#: Most events that pass before they are told.
+MOST_EVENTS = 512
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """The step of the component at `place`, and of those before it, is made: what that one returned."""
+
+    place: int
+    status: int
+
+
+class PlainLoop:
+    """Plain steps of components.
+
+    Parameters
+    ----------
+    components : sequence of Component
+        In the order in which they are stepped.
+    numbers : mapping of str to int
+        By component: the number by which its events are told.
+    start : CallList or None
+        What is moved before a step.
+    inputs : sequence of CallList or None
+        What is moved before the step of each component.
+    event_mode : EventMode
+        What resolves their events.
+    saves : bool
+        A step may have to be repeated: states are saved before it.
+    progress : CouplingProgress
+        How far the run is.
+
+    Attributes
+    ----------
+    run : CouplingRun
+        What the last call has left.
+    """
+
+    def __init__(
+        self,
+        components: Sequence[Component],
+        numbers: Mapping[str, int],
+        start: CallList | None,
+        inputs: Sequence[CallList | None],
+        event_mode: EventMode,
+        *,
+        saves: bool,
+        progress: CouplingProgress,
+    ) -> None:
+        self._components, self._numbers, self._progress = list(components), numbers, progress
+        self._known: list[tuple[Instance, str]] = []
+        self._kept: list[object] = []  # what C code has addresses of
+        self._events = np.zeros((MOST_EVENTS, 3))
+        self._events_address = int(self._events.ctypes.data)
+        self._noted, self._noted_time = c_int64(0), c_double(math.nan)
+        own = addressof(self._noted), addressof(self._noted_time)
+        notes = components[0].instance.wrap
+        noted = (notes.call_address, notes.time_address) if isinstance(notes, CallNotes) else own
+        steps = [self._component(c, i) for c, i in zip(components, inputs, strict=True)]
+        decisions = [addressof(instance.decisions) for instance in event_mode.instances]
+        self._steps = (CouplingComponent * len(steps))(*steps)
+        self._stepped = [(c.instance, step) for c, step in zip(components, self._steps, strict=True)]
+        self._decisions = (c_void_p * max(1, len(decisions)))(*decisions)
+        self._plan = CouplingPlan(
+            components=self._steps,
+            count=len(steps),
+            saves=saves,
+            start=self._calls(() if start is None else start.calls),
+            begin=self._calls(event_mode.begin.calls),
+            again=self._calls(event_mode.again.calls),
+            leave=self._calls(event_mode.leave.calls),
+            decisions=self._decisions,
+            deciding=len(decisions),
+            most_iterations=EVENT_ITERATIONS,
+            same_instant=SAME_INSTANT,
+            time_rounding=TIME_ROUNDING,
+            step_rounding=STEP_ROUNDING,
+            noted_call=noted[0],
+            noted_time=noted[1],
+        )
+        self._at_event = (c_int32 * len(steps))()
+        self.run = CouplingRun(at_event=self._at_event)
+
+    # ---- the plan ----
+
+    def _component(self, component: Component, inputs: CallList | None) -> CouplingComponent:
+        instance = component.instance
+        kind = CallKind.step3 if instance.fmi_version == "3.0" else CallKind.step2
+        times = component.event_times
+        reads = [] if times is None else [StatusCall(times.get_call, instance, f"Get{times.name}", times)]
+        return CouplingComponent(
+            step=self._call(instance, "DoStep", kind=kind),
+            inputs=self._calls(() if inputs is None else inputs.calls),
+            save=self._states(component, "Get", CallKind.save),
+            restore=self._states(component, "Set", CallKind.restore),
+            event_times=self._calls(reads),
+            event_mode=component.event_mode,
+            may_return_early=component.event_mode,
+            number=self._numbers[component.name],
+            internal_step=instance.internal_step,
+            **instance.step_memory,
+        )
+
+    def _states(self, component: Component, verb: str, kind: CallKind) -> CouplingCalls:
+        if not component.has_states:
+            return CouplingCalls()
+        name = verb + component.instance.state_word
+        return self._array(
+            [self._call(component.instance, name, kind=kind, values=addressof(component.at_start))]
+        )
+
+    def _calls(self, calls: Iterable[StatusCall]) -> CouplingCalls:
+        return self._array([self._moved(call) for call in calls])
+
+    def _array(self, calls: Sequence[CouplingCall]) -> CouplingCalls:
+        array = (CouplingCall * max(1, len(calls)))(*calls)
+        self._kept.append(array)
+        return CouplingCalls(array, len(calls))
+
+    def _moved(self, call: StatusCall) -> CouplingCall:
+        """Return a call as C code makes it."""
+        instance, moved = call.instance, call.moved
+        if isinstance(moved, Scaling):
+            self._kept.append(moved)
+            addresses = {"from": moved.read, "gains": moved.gains, "values": moved.write}
+            return CouplingCall(
+                kind=CallKind.scale,
+                value_count=moved.write.size,
+                **{name: array.ctypes.data for name, array in addresses.items()},
+            )
+        if isinstance(moved, VariableGroup):
+            self._kept.append(moved)
+            return self._call(
+                instance,
+                call.function,
+                kind=CallKind.move3 if instance.fmi_version == "3.0" else CallKind.move2,
+                references=moved.references_address,
+                count=len(moved.references),
+                values=moved.values.ctypes.data,
+                value_count=moved.values.size,
+            )
+        if isinstance(instance, Instance3) and call.function == "UpdateDiscreteStates":
+            return self._call(
+                instance, call.function, kind=CallKind.update, values=addressof(instance.decisions)
+            )
+        return self._call(instance, call.function, kind=CallKind.plain)
+
+    def _call(self, instance: Instance, function: str, **fields: int) -> CouplingCall:
+        self._known.append((instance, function))
+        place = len(self._known) - 1
+        name = instance.prefix + function
+        note = instance.wrap.number_of(name) if isinstance(instance.wrap, CallNotes) else place + 1
+        return CouplingCall(
+            function=instance.address_of(function).value,
+            instance=instance.pointer.value,
+            place=place,
+            note=note,
+            **fields,
+        )
+
+    # ---- a run ----
+
+    def advance(
+        self, end: float, macro_step: float, seconds: float, late: LateEvents | None, *, hears_pauses: bool
+    ) -> CouplingEnd:
+        """Make plain steps.
+
+        Parameters
+        ----------
+        end, macro_step : float
+            Time to advance to, and the longest step, s.
+        seconds : float
+            Wall time that it may take, s.
+        late : LateEvents or None
+            What hears of the events that pass; None: nobody does.
+        hears_pauses : bool
+            A step that ends early without an event is left to the caller.
+
+        Returns
+        -------
+        CouplingEnd
+            `done`, `listen`; or what is left of a step, which `run` has: it is the caller's.
+        """
+        run = self.run
+        run.end, run.macro_step, run.hears_pauses = end, macro_step, hears_pauses
+        run.most_seconds = seconds
+        run.wants_to_end, run.events_used = False, 0
+        run.events = None if late is None else self._events_address
+        run.events_room = 0 if late is None else min(MOST_EVENTS, late.room())
+        for instance, step in self._stepped:
+            step.time = instance.time
+        came_to = advance_coupled(self._plan, self._progress, run)
+        for instance, step in self._stepped:
+            instance.take_time(step.time)
+        if late is not None and run.events_used:
+            late.tell(self._events[: run.events_used])
+        return came_to
+
+    def at_event(self) -> list[Component]:
+        """Return the components at an event at the end of the step that was left."""
+        return [self._components[i] for i in self._at_event[: self.run.arrived]]
+
+    def explain(self) -> None:
+        """Raise the error of the call that failed."""
+        instance, function = self._known[self.run.at]
+        instance.check(self.run.status, function.replace("FMUstate", "FMUState"))
+
+    def call_under_way(self) -> tuple[Instance, str, float] | None:
+        """Return the call that C code is in, as another thread sees it, and its time, s; None: in none yet."""
+        place = self._noted.value - 1
+        if place < 0:
+            return None
+        instance, function = self._known[place]
+        return instance, function, self._noted_time.value
+
+
+def can_loop(components: Iterable[Component], lists: Iterable[CallList | None]) -> bool:
+    """Can the calls of these lists, and the steps of these components, be made in C?
+
+    Not where functions of an FMU are wrapped by more than notes, or where values are converted but real numbers.
+    """
+    wraps = [component.instance.wrap for component in components]
+    notes = {w.call_address if isinstance(w, CallNotes) else None for w in wraps}
+    is_noted = all(w is None or isinstance(w, CallNotes) for w in wraps) and len(notes) == 1
+    calls = [call for found in lists if found is not None for call in found.calls]
+    return is_noted and all(call.function != "convert" or call.moved is not None for call in calls)

@@ -1,0 +1,129 @@
+"""What each step of an importer must do: decided once, from its components and connections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.contacts import ContactBonds
+from vibroimpact.orchestrator.importer.events import EventMode
+from vibroimpact.orchestrator.importer.order import fresh_inputs
+from vibroimpact.orchestrator.importer.plain_loop import PlainLoop, can_loop
+from vibroimpact.orchestrator.importer.progress import Progress
+from vibroimpact.orchestrator.importer.revision import Watch
+from vibroimpact.orchestrator.importer.specification import Exchange
+from vibroimpact.orchestrator.importer.tuning import Tuning
+from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, moves_of
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What an importer is made of.
+
+    Attributes
+    ----------
+    components : sequence of Component
+        In the order in which they are stepped.
+    numbers : mapping of str to int
+        Their places in the order in which they are told of.
+    looping : sequence of Transfer
+        The transfers that belong to algebraic loops.
+    """
+
+    components: Sequence[Component]
+    numbers: Mapping[str, int]
+    transfers: Sequence[Transfer]
+    looping: Sequence[Transfer]
+    loops: LoopSolver
+    watches: Sequence[Watch]
+    contacts: ContactBonds
+    tuning: Tuning
+
+
+class StepPlan:
+    """What a step must do.
+
+    Parameters
+    ----------
+    parts : Parts
+        What the importer is made of.
+    exchange : str
+        How values are exchanged.
+    progress : Progress
+        How far the run of the importer is.
+
+    Attributes
+    ----------
+    iterates : bool
+        Steps are repeated until the inputs at their end agree.
+    saves : bool
+        States are saved before a step, which may have to be repeated.
+    prepares : bool
+        A step needs more than moves before it.
+    saved : list of Component
+        Those with states.
+    start_moves, moves_after_loops : CallList or None, CallList
+        What is moved before a step, and after its loops are solved.
+    paths : list of (Component, CallList or None)
+        Those that make a step together, each with what is moved before.
+    stateless_paths : list of (Component, CallList or None)
+        Those that cannot go back, and wait until the end of the step is agreed.
+    event_mode : EventMode
+        What resolves events.
+    """
+
+    def __init__(self, parts: Parts, exchange: Exchange, progress: Progress) -> None:
+        self._parts, self._progress = parts, progress
+        order = parts.components
+        sources = [c for c in order if c.event_mode or self._is_looked_at(c)]
+        alone = len(sources) == 1 and sources[0] is order[0] and sources[0].event_mode
+        self.iterates = exchange == "iterated"
+        self.saves = self.iterates or not (alone or not sources)
+        self.prepares = self.saves or bool(parts.loops.names)
+        self.saved = [c for c in order if c.has_states]
+        incoming = {c.name: [t for t in parts.transfers if t.target is c] for c in order}
+        self._fresh = fresh_inputs(list(order), incoming, jacobi=exchange == "jacobi")
+        self.plan_moves()
+
+    def _is_looked_at(self, component: Component) -> bool:
+        """Are its events found from its outputs?"""
+        watches = self._parts.watches
+        return component.event_times is not None or any(w.component is component for w in watches)
+
+    def plan_moves(self) -> None:
+        """Bind the calls of all moves; again after a transfer's buffers changed."""
+        parts, fresh = self._parts, self._fresh
+        refreshed = [t for ts in fresh.values() for t in ts]
+        behind = [t for t in parts.transfers if t not in refreshed]
+        self.start_moves = moves_of(behind) or None
+        self.moves_after_loops = moves_of(t for t in behind if t not in parts.looping)
+        paths = [(c, moves_of(fresh[c.name]) or None) for c in parts.components]
+        # those that cannot go back wait for the last repetition
+        repeats = self.iterates or bool(parts.contacts)
+        self.paths = [path for path in paths if path[0].has_states or not repeats]
+        self.stateless_paths = [path for path in paths if not path[0].has_states and repeats]
+        self.event_mode = EventMode(parts.components, parts.transfers, behind)
+        self._loop: PlainLoop | None = None
+        self._is_plain: bool | None = None
+
+    @property
+    def plain_loop(self) -> PlainLoop | None:
+        """What makes these steps in C; None where more than components and connections has a say in them."""
+        if self._is_plain is None:
+            self._loop = self._made_loop()
+            self._is_plain = self._loop is not None
+        return self._loop
+
+    def _made_loop(self) -> PlainLoop | None:
+        parts = self._parts
+        if self.iterates or self.stateless_paths or parts.loops.names or parts.watches or parts.tuning:
+            return None
+        components, inputs = zip(*self.paths, strict=True)
+        events = self.event_mode
+        if not can_loop(components, [self.start_moves, *inputs, events.begin, events.again]):
+            return None
+        numbers, progress = parts.numbers, self._progress
+        return PlainLoop(
+            components, numbers, self.start_moves, inputs, events, saves=self.saves, progress=progress
+        )
