@@ -1,4 +1,4 @@
-"""Datasets of xarray made of arrays, without all of dask.array, which takes a quarter of a second to import."""
+"""Datasets of xarray made of arrays, without dask.array and pint, which take a quarter of a second each to import."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Hashable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
+import pandas as pd
 import xarray as xr
+from xarray.core.indexing import PandasIndexingAdapter
 
 Described: TypeAlias = tuple[tuple[Hashable, ...], Any, Mapping[Any, Any]]
 """Dimensions, values and attributes of a variable."""
@@ -35,3 +37,12 @@ def wrapped(variables: Mapping[str, Described | xr.Variable]) -> dict[str, xr.Va
 def new_variable(dims: str | tuple[Hashable, ...], values: Any, attrs: Mapping[Any, Any]) -> xr.Variable:
     """Return one variable of xarray."""
     return xr.Variable(dims, values, attrs, fastpath=type(values) is np.ndarray)
+
+
+def new_axis(dimension: str, values: np.ndarray[Any, Any], attrs: Mapping[Any, Any]) -> xr.IndexVariable:
+    """Return the coordinate along a dimension.
+
+    Of an array that is no index yet xarray asks whether it is one of pint, and imports that to know.
+    """
+    index = PandasIndexingAdapter(pd.Index(values), dtype=values.dtype)
+    return xr.IndexVariable(dimension, index, attrs)

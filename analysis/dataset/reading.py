@@ -19,7 +19,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
-from vibroimpact.analysis.dataset.assembling import assembled, new_variable
+from vibroimpact.analysis.dataset.assembling import assembled, new_axis, new_variable
 from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
@@ -366,7 +366,7 @@ def _grid(
     if directions.size and (directions != Direction.independent).any():
         present, place = _distinct(directions)
         labels = np.array([Direction(int(value)).name for value in present])
-        axes["direction"] = new_variable("direction", labels, _plain(flat.variables["direction"]))
+        axes["direction"] = new_axis("direction", labels, _plain(flat.variables["direction"]))
         sizes["direction"] = labels.size
         places.append(place)
     elif directions.size:
@@ -374,7 +374,8 @@ def _grid(
     for dimension, names_along in _swept_along(flat).items():
         values, place = _distinct_points([flat.variables[name] for name in names_along])
         for name, column in zip(names_along, values.T, strict=True):
-            axes[name] = new_variable(dimension, column, flat.variables[name].attrs)
+            new = new_axis if name == dimension else new_variable
+            axes[name] = new(dimension, column, flat.variables[name].attrs)
         sizes[dimension] = len(values)
         places.append(place)
     run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])

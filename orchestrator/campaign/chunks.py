@@ -23,7 +23,7 @@ from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, marked, 
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
-from vibroimpact.orchestrator.run import Runner, RunnerIdentity, identity_of, named_runner
+from vibroimpact.orchestrator.run import AnnouncedRunner, Runner, RunnerIdentity, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.many import PointLoop, PointValues, loop_of
@@ -336,6 +336,8 @@ def run_points(
     """
     carried = start
     records = []
+    if isinstance(runner, AnnouncedRunner) and start is None and _are_independent(points):
+        runner.announce([(place.point.values, place.start if place.first else None) for place in points])
     for place in points:
         given = place.start if place.first else carried
         record = run_point(scene, runner, place.point, given)
@@ -344,6 +346,10 @@ def run_points(
         if time.perf_counter() > deadline:
             break
     return records, carried
+
+
+def _are_independent(points: Sequence[BranchPoint]) -> bool:
+    return all(place.direction is Direction.independent for place in points)
 
 
 def _next_start(record: RunRecord, start: State | None) -> State | None:

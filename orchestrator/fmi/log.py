@@ -18,6 +18,8 @@ class _Ring(ctypes.Structure):
 
 
 RING_SIZE = ctypes.sizeof(_Ring)
+NO_LINES = bytes(_Ring.count.size)
+"""The first bytes of a ring in which nothing is logged."""
 
 
 class LogTail:
@@ -31,23 +33,19 @@ class LogTail:
 
     def __init__(self, memory: memoryview | None = None) -> None:
         self._ring = _Ring() if memory is None else _Ring.from_buffer(memory)
-        self._read = 0
 
     @property
     def environment(self) -> ctypes.c_void_p:
         """Pointer for the component's callbacks."""
         return ctypes.c_void_p(ctypes.addressof(self._ring))
 
-    @property
-    def count(self) -> int:
-        """Lines logged so far."""
-        return int(self._ring.count)
-
     def take(self) -> tuple[str, ...]:
         """Return the last lines since the call before, oldest first."""
-        first = max(self._read, self.count - LINES)
-        self._read = self.count
-        return tuple(self._line(i % LINES) for i in range(first, self._read))
+        count = int(self._ring.count)
+        if count == 0:
+            return ()
+        self._ring.count = 0
+        return tuple(self._line(i % LINES) for i in range(max(0, count - LINES), count))
 
     def _line(self, slot: int) -> str:
         return bytes(self._ring.lines[slot].value).decode("utf-8", "replace")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -12,11 +13,19 @@ from typing import Any, BinaryIO
 
 from vibroimpact.fmus.errors import ComponentFileError, VibroimpactError
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
-from vibroimpact.orchestrator.guard.pipe import Failure, Order, PointTask, receive, send
+from vibroimpact.orchestrator.guard.pipe import (
+    BATCH_TIME,
+    BELL,
+    Failure,
+    Order,
+    PointTask,
+    packed,
+    receive,
+)
 from vibroimpact.orchestrator.run import Runner, identity_of, open_runner
 
-#: How often the child looks at its parent and at what it is doing itself, s.
-LOOK = 0.1
+#: How often the child looks at its parent and at what it is doing itself, s: less than its parent waits for it (GRACE).
+LOOK = 0.25
 
 
 def _look_around(parent: int, notes: Breadcrumbs) -> None:
@@ -36,12 +45,45 @@ def _look_around(parent: int, notes: Breadcrumbs) -> None:
     threading.Thread(target=look, daemon=True).start()
 
 
-def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
+class _Answers:
+    """The way of answers to the guard, which sleeps until the bell rings: waking it takes longer than an answer does.
+
+    Rung after the last answer of a batch, and when the pipe is full. What is in the pipe outlives this process.
+    """
+
+    def __init__(self, pipe: int, bell: int | None) -> None:
+        self._pipe, self._bell = pipe, bell
+        self._unread = 0
+        if bell is not None:
+            os.set_inheritable(bell, False)
+            os.set_blocking(pipe, False)
+
+    def put(self, message: Any, *, last: bool = True) -> None:
+        """Answer; `last`: nothing more comes of what was to be run."""
+        self._unread += 1
+        left = memoryview(packed(message))
+        with contextlib.suppress(BlockingIOError):
+            left = left[os.write(self._pipe, left) :]
+        if last or left:
+            self._ring(last)
+        if left:
+            os.set_blocking(self._pipe, True)
+            while left:
+                left = left[os.write(self._pipe, left) :]
+            os.set_blocking(self._pipe, False)
+
+    def _ring(self, last: bool) -> None:
+        if self._bell is not None:
+            os.write(self._bell, BELL.pack(self._unread, last))
+        self._unread = 0
+
+
+def _private_pipes() -> tuple[BinaryIO, int]:
     """Keep standard input and output for orders and answers; what an FMU prints goes to standard error.
 
     Neither an FMU nor a program that it starts can read an order or hold the answers open.
     """
-    orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    orders, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
@@ -51,21 +93,34 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
 
 def _answer(runner: Runner, point: PointTask) -> Any:
     try:
-        return runner.run(point.values, point.start)
+        return runner.run(*point)
     except (VibroimpactError, ArithmeticError, ValueError) as error:
         return Failure(str(error))
+
+
+def _serve(runner: Runner, batch: tuple[PointTask, ...], notes: Breadcrumbs, answers: _Answers) -> None:
+    """Run points, until all are done or their time is over."""
+    end = time.monotonic() + BATCH_TIME
+    for left, point in zip(reversed(range(len(batch))), batch, strict=True):
+        notes.begin()
+        answer = _answer(runner, point)
+        last = left == 0 or time.monotonic() > end
+        answers.put(answer, last=last)
+        if last:
+            return
 
 
 def _open(order: Order, notes: Breadcrumbs) -> Runner:
     return open_runner(order.scene, order.execution, log=notes.log, wrap=notes.wrap if order.noting else None)
 
 
-def main() -> None:
-    """Serve points until standard input ends."""
+def main(bell: int | None) -> None:
+    """Serve points until standard input ends; `bell`: where to ring it, None where the guard reads at once."""
     # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = os.getppid()
-    orders, answers = _private_pipes()
+    orders, pipe = _private_pipes()
+    answers = _Answers(pipe, bell)
     order = receive(orders)
     if not isinstance(order, Order):
         return
@@ -74,9 +129,9 @@ def main() -> None:
     try:
         runner = _open(order, notes)
     except VibroimpactError as error:
-        send(answers, Failure(str(error), misuse=isinstance(error, ComponentFileError)))
+        answers.put(Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
-    send(answers, identity_of(runner))
-    while isinstance(point := receive(orders), PointTask):
-        send(answers, _answer(runner, point))
+    answers.put(identity_of(runner))
+    while (batch := receive(orders)) is not None:
+        _serve(runner, batch, notes, answers)
     runner.close()

@@ -1,7 +1,8 @@
 """Runs points in a child process that an FMU may crash or hang without taking the campaign with it.
 
-The child is used again for every point; only after a crash or a missed deadline a new one is made. What the child
-was doing is read from `breadcrumbs`. A hanging call is seen there at no cost. To see a call that crashes, every call
+The child is used again for every point; only after a crash or a missed deadline a new one is made. Points that are
+announced are run in batches: waking two processes for each of them costs more than all else. What the child was doing
+is read from `breadcrumbs`. A hanging call is seen there at no cost. To see a call that crashes, every call
 must be noted before it is made: that is done from the first crash on.
 
 A point is repeated once, in a new process, where its loss may be no fault of its own: a crash in a process that has
@@ -12,23 +13,21 @@ goes well, the result counts. What an FMU starts ends with the child (`superviso
 from __future__ import annotations
 
 import math
-import os
-import queue
-import subprocess
-import threading
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from multiprocessing.connection import wait
+from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
-from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.fmus.python_child import ending
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
-from vibroimpact.orchestrator.guard.pipe import Failure, Order, PointTask, receive, send
+from vibroimpact.orchestrator.guard.pipe import BATCH_TIME, MOST_POINTS, Failure, Order, PointTask
+from vibroimpact.orchestrator.guard.point_process import HAS_BELL, PointProcess
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, open_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
@@ -37,91 +36,24 @@ from vibroimpact.orchestrator.scene import Scene
 DEFAULT_DEADLINE = 300.0
 #: What a child may take beyond the deadline to end the point by itself, s.
 GRACE = 0.5
-#: A process that can wait for a pipe itself saves the two switches to a thread that reads it.
-WAITS_ON_PIPES = os.name == "posix"
 #: Starting Python and loading the FMUs, s.
 START_TIME = 60.0
-#: What a child that is to end may take, s: longer than its supervisor takes to end all that an FMU has started.
-END_TIME = 10.0
 #: Calls that end the life of the point before.
 AFTER_A_POINT = ("Reset", "FreeInstance", "Terminate")
 
 
 @dataclass(frozen=True, slots=True)
 class _Loss:
-    """A point that took its process down or did not answer: its outcome, why, and the FMI call that was under way."""
+    """A point that took its process down or did not answer.
+
+    `function`: the FMI call that was under way; `used`: its process had run other points; `seconds`: what it cost.
+    """
 
     outcome: Outcome
     message: str
     function: str
-
-
-class _Child:
-    """A running child process; there is at most one answer on its way."""
-
-    def __init__(self, order: Order) -> None:
-        self._process = subprocess.Popen(
-            python_command("-m", "vibroimpact.orchestrator.guard.supervisor"),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C reaches all processes of a terminal's session: it is the parent's
-        )
-        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._reader: threading.Thread | None = None
-        if not WAITS_ON_PIPES:
-            self._reader = threading.Thread(target=self._read, daemon=True)
-            self._reader.start()
-        self.say(order)
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        while (answer := receive(self._process.stdout)) is not None:
-            self._answers.put(answer)
-        self._answers.put(None)
-
-    def say(self, message: Any) -> None:
-        """Send a message; a child that is gone shows in its answer."""
-        assert self._process.stdin is not None
-        try:
-            send(self._process.stdin, message)
-        except BrokenPipeError:
-            return  # its output has ended too, which `answer` sees
-
-    def answer(self, seconds: float) -> Any:
-        """Return the next answer, None when the child is gone; raises TimeoutError."""
-        if self._reader is None:
-            assert self._process.stdout is not None
-            if not wait([self._process.stdout.fileno()], seconds):
-                raise TimeoutError
-            return receive(self._process.stdout)
-        try:
-            return self._answers.get(timeout=seconds)
-        except queue.Empty:
-            raise TimeoutError from None
-
-    def end(self, *, at_once: bool = False) -> int:
-        """End the child, by force if it does not by itself; returns its exit code (negative: the signal)."""
-        self._close(self._process.stdin)
-        if at_once:
-            self._process.terminate()
-        try:
-            code = self._process.wait(END_TIME)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            code = self._process.wait()
-        if self._reader is not None:
-            self._reader.join()
-        self._close(self._process.stdout)
-        return code
-
-    @staticmethod
-    def _close(pipe: IO[bytes] | None) -> None:
-        assert pipe is not None
-        try:
-            pipe.close()
-        except BrokenPipeError:
-            return  # what was still to be sent has no reader any more
+    used: bool
+    seconds: float
 
 
 class GuardedRunner:
@@ -137,8 +69,11 @@ class GuardedRunner:
         self._scene = scene
         self._wanted = execution
         self._folder = ScratchFolder("guard")
-        self._child: _Child | None = None
+        self._child: PointProcess | None = None
         self._points = 0  # that the child has run
+        self._announced: deque[PointTask] = deque()
+        self._ready: deque[tuple[PointTask, RunRecord | Failure | _Loss]] = deque()
+        self._batch_size = 1
         self._noting = False
         try:
             identity = self._start()
@@ -156,91 +91,123 @@ class GuardedRunner:
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
         self._notes.begin()
-        self._child = _Child(Order(self._scene, self._wanted, str(path), self._noting))
+        self._child = PointProcess(Order(self._scene, self._wanted, str(path), self._noting))
         try:
-            answer = self._child.answer(START_TIME)
+            (answer,), _ = self._child.answers(START_TIME)
         except TimeoutError:
             answer = Failure(self._what_happened(f"no answer within {START_TIME:g} s"))
         if isinstance(answer, RunnerIdentity):
             self._points = 0
             return answer
-        code = self._end_child(at_once=answer is not None)
+        code, _ = self._end_child(at_once=answer is not None)
         if isinstance(answer, Failure):
             raise (ComponentFileError if answer.misuse else ComponentError)(answer.message)
         raise ComponentError(self._what_happened(f"the process {ending(code)}"))
 
+    def announce(self, points: Sequence[PointTask]) -> None:
+        """Say which points `run` will be asked for next, with the very objects that it will be given."""
+        self._announced = deque(points if HAS_BELL else ())
+
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
-        """Run one point; a crash or a missed deadline is its outcome.
+        """Run one point, and some of those announced after it; a crash or a missed deadline is its outcome.
 
         Raises
         ------
         ComponentError
             The point failed in the child, which lives on.
         """
-        began = time.perf_counter()
-        point = PointTask(dict(values), start)
-        used = self._child is not None and self._points > 0
-        found = self._attempt(point)
+        point = (values, start)
+        if not self._ready or not _are_same(self._ready[0][0], point):
+            batch = self._batch_from(point)
+            self._ready = deque(zip(batch, self._attempt(batch), strict=False))
+        _, found = self._ready.popleft()
+        if self._announced:
+            self._announced.popleft()
         if isinstance(found, _Loss):
-            found = self._second_attempt(point, found, used=used)
-        seconds = time.perf_counter() - began
+            found = self._second_attempt(point, found)
+        if isinstance(found, Failure):
+            raise ComponentError(found.message)
         if isinstance(found, _Loss):
-            return empty_record(self._scene, found.outcome, found.message, seconds)
-        return replace(found, seconds=seconds)
+            return empty_record(self._scene, found.outcome, found.message, found.seconds)
+        return found
 
-    def _attempt(self, point: PointTask) -> RunRecord | _Loss:
-        """Run a point in the child, or in a new one."""
+    def _batch_from(self, point: PointTask) -> list[PointTask]:
+        """Return a point with those announced after it that fit into the time of a batch."""
+        if not self._announced or not _are_same(self._announced[0], point):
+            self._announced.clear()
+            return [point]
+        return list(islice(self._announced, self._batch_size))
+
+    def _attempt(self, batch: Sequence[PointTask]) -> list[RunRecord | Failure | _Loss]:
+        """Run points in the child, or in a new one; returns what became of them, up to a loss or the end of a batch."""
         if self._child is None:
             self._start()
         assert self._child is not None
-        self._points += 1
+        began, used = time.perf_counter(), self._points > 0
         self._notes.begin()
-        self._child.say(point)
+        self._child.say(tuple((dict(values), start) for values, start in batch))
         try:
-            answer = self._child.answer(self._deadline + GRACE)
-        except TimeoutError:
-            return self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s")
-        if answer is None:
-            return self._lost(Outcome.crash, f"the process {ending(self._end_child())}")
-        if isinstance(answer, Failure):
-            raise ComponentError(answer.message)
-        record: RunRecord = answer
-        return record
+            found, loss = self._answers_to(batch)
+        except BaseException:  # Ctrl-C: what would be answered next is no longer asked for
+            self._end_child(at_once=True)
+            raise
+        seconds = time.perf_counter() - began
+        self._points += len(found)
+        self._batch_size = max(1, min(MOST_POINTS, int(BATCH_TIME * len(found) / seconds)))
+        if loss is not None and len(found) < len(batch):
+            seconds -= sum(record.seconds for record in found if isinstance(record, RunRecord))
+            found.append(replace(loss, used=used or len(found) > 0, seconds=seconds))
+        return found
 
-    def _second_attempt(self, point: PointTask, loss: _Loss, *, used: bool) -> RunRecord | _Loss:
+    def _answers_to(self, batch: Sequence[PointTask]) -> tuple[list[Any], _Loss | None]:
+        """Wait for the answers to a batch; returns them, and why they ended early if the child is lost."""
+        assert self._child is not None
+        # the last point of several begins before BATCH_TIME is over
+        most = self._deadline + GRACE + (BATCH_TIME if len(batch) > 1 else 0.0)
+        found, last = [], False
+        try:
+            while not last:
+                answers, last = self._child.answers(most)
+                found += answers
+        except TimeoutError:
+            _, unread = self._end_child(at_once=True)  # first: it may still be writing what is read then
+            return found + unread, self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s")
+        if found[-1] is not None:
+            return found, None
+        code, unread = self._end_child()
+        return found[:-1] + unread, self._lost(Outcome.crash, f"the process {ending(code)}")
+
+    def _second_attempt(self, point: PointTask, loss: _Loss) -> RunRecord | Failure | _Loss:
         """Repeat a lost point in a new process where that may help, or tell which call crashes."""
         if loss.outcome is Outcome.crash:
-            helps = used or not self._noting
+            helps = loss.used or not self._noting
             self._noting = True
         else:
             # no call known: the process was stopped, perhaps by what the point before has left
-            helps = used and (not loss.function or loss.function.endswith(AFTER_A_POINT))
+            helps = loss.used and (not loss.function or loss.function.endswith(AFTER_A_POINT))
         if not helps:
             return loss
-        try:
-            again = self._attempt(point)
-        except ComponentError as error:
-            raise ComponentError(f"{error} Before that, in another process: {loss.message}") from error
-        if isinstance(again, _Loss) and again.outcome is not loss.outcome:
-            return replace(again, message=f"{again.message}. In another process before: {loss.message}")
+        (again,) = self._attempt([point])
+        if isinstance(again, Failure):
+            return Failure(f"{again.message} Before that, in another process: {loss.message}")
+        seconds = loss.seconds + again.seconds
         if isinstance(again, _Loss):
-            return again
+            differs = again.outcome is not loss.outcome
+            before = f". In another process before: {loss.message}" if differs else ""
+            return replace(again, message=again.message + before, seconds=seconds)
         remark = f"repeated in a new process, where it went well; in the first: {loss.message}"
-        return replace(again, message="; ".join(filter(None, (again.message, remark))))
+        return replace(again, message="; ".join(filter(None, (again.message, remark))), seconds=seconds)
 
     def _lost(self, outcome: Outcome, what: str) -> _Loss:
-        """Give up a child that is gone or does not answer and say what it was doing."""
-        if self._child is not None:  # first: it may still be writing what is read then
-            self._end_child(at_once=True)
+        """Say what a child was doing that is gone or did not answer."""
         known = self._noting or outcome is Outcome.timeout
         message = self._what_happened(what) if known else f"guard: {what}"
-        return _Loss(outcome, message, self._notes.last_call()[1])
+        return _Loss(outcome, message, self._notes.last_call()[1], used=False, seconds=0.0)
 
-    def _end_child(self, *, at_once: bool = False) -> int:
+    def _end_child(self, *, at_once: bool = False) -> tuple[int, list[Any]]:
         assert self._child is not None
-        code = self._child.end(at_once=at_once)
-        self._child = None
-        return code
+        child, self._child = self._child, None
+        return child.end(at_once=at_once)
 
     def _what_happened(self, what: str) -> str:
         instance, function, at = self._notes.last_call()
@@ -265,6 +232,11 @@ class GuardedRunner:
         if self._child is not None:
             self._end_child()
         self._folder.cleanup()
+
+
+def _are_same(one: PointTask, other: PointTask) -> bool:
+    """Whether two points are one and the same: values may be equal and differ in the sign of a zero."""
+    return one[0] is other[0] and one[1] == other[1]
 
 
 def make_runner(scene: Scene, *, execution: str = "auto") -> Runner:

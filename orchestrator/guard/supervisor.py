@@ -1,8 +1,9 @@
 """Stands between a guard and the process that runs FMUs, so that nothing an FMU has started outlives it.
 
-Started as `python -m`, it forks before anything of size is imported. The fork runs the points (`child`) in a
-process group of its own; the supervisor runs no code of an FMU, so none can take it down. When the fork ends, or the
-guard closes its pipe, dies, or says so, the supervisor kills all that is left and ends as the fork has ended.
+Started as `python -m` with the descriptor of the bell (`pipe`), it forks before anything of size is imported. The fork
+runs the points (`child`) in a process group of its own; the supervisor runs no code of an FMU, so none can take it
+down. When the fork ends, or the guard closes its pipe, dies, or says so, the supervisor kills all that is left and
+ends as the fork has ended.
 
 On Linux it is the reaper of its descendants: those that left the process group (setsid) come back to it. Elsewhere
 it knows the process group only.
@@ -33,7 +34,8 @@ PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 def main() -> None:
     """Fork, let the fork serve points, and end with it."""
     if not hasattr(os, "fork"):
-        return _serve()
+        return _serve(None)
+    bell = int(sys.argv[1])
     guard, supervisor = os.getppid(), os.getpid()
     _control_process(PR_SET_CHILD_SUBREAPER, 1)
     wakeup = _wakeup_pipe()
@@ -45,19 +47,19 @@ def main() -> None:
         _control_process(PR_SET_PDEATHSIG, signal.SIGKILL)
         os.setpgid(0, 0)
         if os.getppid() == supervisor:
-            _serve()
+            _serve(bell)
         return None
-    _close_output()
+    _close_output(bell)
     status = _wait_for_end(fork, guard, wakeup)
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(fork, signal.SIGKILL)
     _end_like(_kill_descendants(fork, status))
 
 
-def _serve() -> None:
+def _serve(bell: int | None) -> None:
     from vibroimpact.orchestrator.guard.child import main  # heavy, and nothing that the supervisor needs
 
-    main()
+    main(bell)
 
 
 def _control_process(option: int, value: int) -> None:
@@ -77,11 +79,12 @@ def _wakeup_pipe() -> int:
     return readable
 
 
-def _close_output() -> None:
-    """Leave the answers to the fork: the guard shall see the pipe end when the fork does."""
+def _close_output(bell: int) -> None:
+    """Leave answers and bell to the fork: the guard shall see these pipes end when the fork does."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.close(nowhere)
+    os.close(bell)
 
 
 def _wait_for_end(fork: int, guard: int, wakeup: int) -> int | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.opening import (
+    AnnouncedRunner,
     Runner,
     RunnerIdentity,
     identity_of,
@@ -14,6 +15,7 @@ from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.run.session import Session
 
 __all__ = [
+    "AnnouncedRunner",
     "GeneralRunner",
     "PointRunner",
     "Runner",

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
@@ -51,6 +51,14 @@ class Runner(Protocol):
 
     def close(self) -> None:
         """Free the components."""
+
+
+@runtime_checkable
+class AnnouncedRunner(Runner, Protocol):
+    """A runner that is faster when it knows which points come next."""
+
+    def announce(self, points: Sequence[tuple[Mapping[str, float], tuple[float, ...] | None]]) -> None:
+        """Say what `run` will be given next: these objects, in this order; it may also be given others."""
 
 
 def open_runner(

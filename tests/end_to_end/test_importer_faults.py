@@ -204,6 +204,27 @@ def test_a_hundred_failing_points_do_not_confuse_what_is_told_of_the_next_one(fo
         runner.close()
 
 
+def test_neighbours_of_faults_in_a_batch_are_kept_and_each_fault_is_told_as_if_it_were_alone(
+    runner_of: Callable[[str, float], GuardedRunner],
+) -> None:
+    runner = runner_of("3.0", IMPATIENCE)
+    faults = ["none"] * 4 + ["segfault", "none", "none", "error", "none", "none", "hang", "none", "none"]
+    points = [{"culprit.fault": float(FAULTS.index(fault))} for fault in faults]
+    runner.announce([(values, None) for values in points])
+    for fault, values in zip(faults, points, strict=True):
+        if fault == "none":
+            assert_runs_well(runner.run(values))
+        elif fault == "error":
+            with pytest.raises(ComponentError) as failure:
+                runner.run(values)
+            assert str(failure.value).startswith(SAID[fault].format(fmi="fmi3"))
+        else:
+            record = runner.run(values)
+            assert record.outcome is OUTCOMES[fault]
+            assert record.message.startswith(SAID[fault].format(fmi="fmi3"))
+            assert record.seconds > (IMPATIENCE if fault == "hang" else 0.0)
+
+
 def test_a_child_that_is_killed_between_two_points_costs_no_point(folder: Path) -> None:
     runner = make_runner(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
     try:

@@ -1,13 +1,13 @@
-"""A stand-in for the point runner: real work of a stated length, results that depend on every input.
+"""A stand-in for the point runner: points of a stated length, results that depend on every input.
 
 It lets the campaign engine be tested and timed without any component. `BusyRunner` is a map with carried
-state; each of its points costs about the number of milliseconds in `body.mass`.
+state; each of its points takes about the number of milliseconds in `body.mass`. They sleep: a component leaves the
+interpreter to others as well, and the processors are for what is tested.
 """
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import math
 import os
 import signal
@@ -22,17 +22,9 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard.guarded import make_runner
 from vibroimpact.orchestrator.scene import Scene
 
-ROUNDS_PER_MILLISECOND = 4400
-"""Rounds of a hash that take about 1 ms; the work is fixed, so timings compare."""
-
-
-def burn(milliseconds: float) -> None:
-    """Do work of a fixed amount outside the interpreter lock, as a component does."""
-    hashlib.pbkdf2_hmac("sha256", b"point", b"salt", max(1, round(milliseconds * ROUNDS_PER_MILLISECOND)))
-
 
 class BusyRunner:
-    """Burns `body.mass` milliseconds for a point and returns a record of three impacts."""
+    """Takes `body.mass` milliseconds for a point and returns a record of three impacts."""
 
     execution = "busy"
     instruction_set = "none"
@@ -46,7 +38,7 @@ class BusyRunner:
         """Run one point: a contraction towards a point that the swept values decide."""
         began = time.perf_counter()
         scene = self.scene.at(values)
-        burn(scene.body.mass)
+        time.sleep(scene.body.mass * 1e-3)
         displacement, velocity = start if start is not None else (scene.body.displacement_start, 0.0)
         target = self.target(scene, values)
         displacement = 0.9 * displacement + math.sin(target)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 
+import numpy as np
 import pytest
 
-from vibroimpact.orchestrator.guard.pipe import LENGTH, Failure, Order, PointTask, receive, send
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.orchestrator.guard.pipe import HEAD, Failure, Order, receive, send
 from vibroimpact.orchestrator.scene import parse_scene
 
 FREE = "[body]\nmass = 1\nstiffness = 1\n[record]\nrecorded_time = 5"
@@ -22,7 +24,7 @@ def sent(*messages: object) -> bytes:
 def test_messages_arrive_one_by_one_as_they_were_sent() -> None:
     messages = [
         Order(parse_scene(FREE, "scene.toml"), "fused", "notes", noting=True),
-        PointTask({"body.mass": 0.1 + 0.2}, (1.0, -0.0)),
+        (({"body.mass": 0.1 + 0.2}, (1.0, -0.0)), ({"body.mass": 1.0}, None)),
         Failure("a: expected b, got c\n\N{GREEK SMALL LETTER OMEGA}", misuse=True),
     ]
     pipe = io.BytesIO(sent(*messages))
@@ -30,6 +32,30 @@ def test_messages_arrive_one_by_one_as_they_were_sent() -> None:
     assert receive(pipe) is None
 
 
-@pytest.mark.parametrize("kept", [0, 1, LENGTH.size - 1, LENGTH.size, LENGTH.size + 1, -1])
+@pytest.mark.parametrize("kept", [0, 1, HEAD.size - 1, HEAD.size, HEAD.size + 1, -1])
 def test_a_message_that_was_cut_off_is_none(kept: int) -> None:
     assert receive(io.BytesIO(sent(Failure("lost"))[:kept])) is None
+
+
+def test_a_record_arrives_with_every_bit_of_its_arrays_which_may_be_written() -> None:
+    table = np.arange(12.0).reshape(3, 4)
+    sent_record = RunRecord(
+        Outcome.stuck,
+        "stuck",
+        periods=np.empty((0, 5)),
+        impacts=table[:, ::2],  # not contiguous
+        samples=np.asfortranarray(table),
+        events=np.array([[np.nan, -0.0, np.inf]]),
+        final_displacement=0.1 + 0.2,
+        loop_residual=1e-300,
+    )
+    record = receive(io.BytesIO(sent(sent_record)))
+    assert record.outcome is Outcome.stuck
+    for name in RunRecord.__slots__:
+        value, expected = getattr(record, name), getattr(sent_record, name)
+        if isinstance(expected, np.ndarray):
+            assert value.shape == expected.shape
+            assert value.tobytes() == expected.tobytes()
+            assert value.flags.writeable
+        else:
+            np.testing.assert_equal(value, expected)

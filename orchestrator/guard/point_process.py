@@ -1,0 +1,124 @@
+"""The child process of a guard, as the guard sees it: what it is told, what it answers, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import queue
+import select
+import subprocess
+import threading
+from functools import partial
+from typing import IO, Any
+
+from vibroimpact.fmus.python_child import python_command
+from vibroimpact.orchestrator.guard.pipe import BELL, Order, receive, send
+
+#: A process that can wait for a bell runs points in batches; elsewhere a thread reads the answers one by one.
+HAS_BELL = os.name == "posix"
+#: What a child that is to end may take, s: longer than its supervisor takes to end all that an FMU has started.
+END_TIME = 10.0
+
+
+class PointProcess:
+    """A running child process; there are at most the answers of one batch on their way."""
+
+    def __init__(self, order: Order) -> None:
+        self._bell, bell = os.pipe() if HAS_BELL else (-1, -1)
+        self._process = subprocess.Popen(
+            python_command("-m", "vibroimpact.orchestrator.guard.supervisor", str(bell)),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C reaches all processes of a terminal's session: it is the parent's
+            pass_fds=(bell,) if HAS_BELL else (),
+        )
+        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._reader: threading.Thread | None = None
+        if HAS_BELL:
+            os.close(bell)
+            self._poll = select.poll()
+            self._poll.register(self._bell, select.POLLIN)
+        else:
+            self._reader = threading.Thread(target=self._read, daemon=True)
+            self._reader.start()
+        self.say(order)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        while (answer := receive(self._process.stdout)) is not None:
+            self._answers.put(answer)
+        self._answers.put(None)
+
+    def say(self, message: Any) -> None:
+        """Send a message; a child that is gone shows in its answer."""
+        assert self._process.stdin is not None
+        try:
+            send(self._process.stdin, message)
+        except BrokenPipeError:
+            return  # its output has ended too, which `answers` sees
+
+    def answers(self, seconds: float) -> tuple[list[Any], bool]:
+        """Wait until there is something to read; return the answers, and whether no more of them come.
+
+        The last answer of a child that is gone is None.
+
+        Raises
+        ------
+        TimeoutError
+            The child has not rung its bell; what it had answered is among `end`'s answers.
+        """
+        if self._reader is not None:
+            try:
+                return [self._answers.get(timeout=seconds)], True
+            except queue.Empty:
+                raise TimeoutError from None
+        if not self._poll.poll(1e3 * seconds):
+            raise TimeoutError
+        rung = os.read(self._bell, BELL.size)
+        if len(rung) < BELL.size:
+            return [None], True
+        count, last = BELL.unpack(rung)
+        assert self._process.stdout is not None
+        answers = [receive(self._process.stdout) for _ in range(count)]
+        return answers, last or answers[-1] is None
+
+    def end(self, *, at_once: bool = False) -> tuple[int, list[Any]]:
+        """End the child, by force if it does not by itself.
+
+        Returns
+        -------
+        code : int
+            Its exit code (negative: the signal).
+        answers : list
+            What it had answered and nobody has read.
+        """
+        self._close(self._process.stdin)
+        if at_once:
+            self._process.terminate()
+        try:
+            code = self._process.wait(END_TIME)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        answers = self._unread()
+        self._close(self._process.stdout)
+        return code, answers
+
+    def _unread(self) -> list[Any]:
+        if self._reader is not None:
+            self._reader.join()
+            return []
+        os.close(self._bell)
+        pipe = self._process.stdout
+        assert pipe is not None
+        # a process that an FMU has started may hold the pipe open
+        os.set_blocking(pipe.fileno(), False)
+        return list(iter(partial(receive, pipe), None))
+
+    @staticmethod
+    def _close(pipe: IO[bytes] | None) -> None:
+        assert pipe is not None
+        try:
+            pipe.close()
+        except BrokenPipeError:
+            return  # what was still to be sent has no reader any more
