@@ -168,7 +168,9 @@ def test_a_certified_search_never_passes_a_contact(
     zeta: float, w: float, position: float, behind: float, velocity: float, phase: float
 ) -> None:
     body = (1.0, 2.0 * zeta, 1.0, 0.9, w)
-    assume(behind < -1e-6 or abs(velocity) > 1e-12)  # on the stop at rest, but for rounding, it rests, or leaves
+    assume(
+        behind < -1e-6 or abs(velocity) > 1e-12
+    )  # on the stop at rest, but for rounding, it rests, or leaves
     state, horizon = (position + behind, velocity), 12.0
     contact = next_contact(Oscillator(*body), state, position, horizon, phase=phase)
     end = horizon if contact is None else contact.time
