@@ -1,0 +1,95 @@
+/* Many runs of one kind of body at once: points of a scene in lockstep, one in each lane of the vector registers.
+ *
+ * A body of few modes with rigid stops flies, hits, rebounds; all lanes do the same arithmetic under masks, made of
+ * + - * / and square roots only, so that every instruction set, every number of lanes and every cut of the points gives
+ * the same bits. What is rare (chatter, a rest, a start on a stop, a touch that rounding would decide, a parameter that a
+ * body refuses) is not done here: such a point is left for the scalar engine, which runs it from its start.
+ */
+#ifndef VIBROIMPACT_LANES_H
+#define VIBROIMPACT_LANES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "door/door.h"
+
+enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 };
+
+/* Why vi_door_lanes returns. */
+enum {
+    VI_LANES_DONE = 0,   /* all points have run */
+    VI_LANES_LISTEN = 1, /* it has taken as long as it was to; call again to go on */
+    VI_LANES_FULL = 2,   /* the rows need more room: take them, then call again */
+    VI_LANES_LEFT = 3,   /* only points that are left, and those of their branches behind them, have not run */
+    VI_LANES_REFUSED = 4 /* the plan is none: sizes, or an instruction set that this machine has not */
+};
+
+/* How far a point is. */
+enum {
+    VI_POINT_WAITS = 0,
+    VI_POINT_RUNS = 1,
+    VI_POINT_HAS_RUN = 2,
+    VI_POINT_IS_LEFT = 3,    /* for the scalar engine: its rows, if there are any, are void */
+    VI_POINT_IS_ANSWERED = 4 /* set by the caller, with outcome, final_q and final_p: the scalar engine has run it */
+};
+
+/* Instruction sets; 0: the best that the machine has. */
+enum { VI_INSTRUCTIONS_BEST = 0, VI_INSTRUCTIONS_BASELINE = 1, VI_INSTRUCTIONS_AVX2 = 2, VI_INSTRUCTIONS_AVX512 = 3 };
+
+/* What all points have in common. */
+typedef struct {
+    int32_t modes;    /* 1 to VI_LANES_MODES */
+    int32_t contacts; /* 0 to VI_LANES_CONTACTS; each a rigid stop */
+    int32_t impacts, extrema, periods; /* what is recorded between begin and end, as in record.h */
+    int32_t instructions;
+    int64_t impact_limit; /* of a run; 0: none */
+} vi_lanes_plan;
+
+/* The points. Arrays are [point], [mode][point], [contact][point] or [contact][mode][point], in SI units.
+ *
+ * A mode is q'' + 2 decay q' + stiffness q = force cos(phase) + held. A displacement is shape . q, and an impulse of
+ * 1 N s at a contact adds `impulse` to q': modes are mass-normalised, or, of one mass, q is its displacement (shape 1,
+ * impulse 1/mass). A force of angular frequency 0 is constant.
+ */
+typedef struct {
+    int64_t count;
+    const double *stiffness, *decay, *force, *held; /* [mode][point] 1/s^2, 1/s; force and held load per unit modal mass */
+    const double *angular_frequency, *phase;        /* of the force at time 0, rad/s, rad */
+    const double *shape, *impulse;                  /* [contact][mode][point] */
+    const double *observed;                         /* [mode][point] shape of the point that rows and finals tell of */
+    const double *position, *direction;             /* [contact][point] of the stop, m; +1: above the motion, -1: below */
+    const double *restitution, *yield_velocity;     /* [contact][point] as contact_law.h has them */
+    const double *start_q, *start_p;                /* [mode][point]; of the points that begin a branch */
+    const double *begin, *end;                      /* of the recording, s */
+    /* Here a branch begins (independent points: each). The next point of a branch starts at time 0 from the state where
+     * the last one before it that came to its end (outcome 0) has ended. The first point of all counts as one. */
+    const uint8_t *first;
+    uint8_t *state;              /* all VI_POINT_WAITS at first */
+    int8_t *outcome;             /* VI_RUN_ENDED or VI_RUN_IMPACT_LIMIT of runs.h */
+    double *reached;             /* time where it ended, s */
+    double *displacement, *velocity; /* there, of the observed point */
+    double *final_q, *final_p;   /* there, [mode][point] */
+    int64_t *rows_of;            /* rows of each: 0 again once it is left */
+    /* Rows as record.h has them; those of one point are in the order of their time, among those of others. */
+    double *rows;                /* [rows_room][VI_RECORD_WIDTH] */
+    int64_t *owner;              /* [rows_room] point of each row */
+    int64_t rows_room, rows_used; /* rows_room >= VI_LANES_LEAST_ROOM; the caller takes rows by rows_used = 0 */
+    int64_t finished;            /* points that have run or are left since the first call */
+    double most_seconds;         /* of one call */
+} vi_lanes_points;
+
+/* Least room for rows. */
+enum { VI_LANES_LEAST_ROOM = 4096 };
+
+/* Bytes of memory that runs of this plan need; 0 for a plan that is refused. */
+VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan);
+
+/* Run what is left of the points. `memory` holds what is under way between two calls: all 0 before the first; afterwards
+ * it goes with these points, whose arrays may be elsewhere by the next call. Returns one of VI_LANES_DONE to
+ * VI_LANES_REFUSED. */
+VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, void *memory);
+
+/* The instruction set that runs where this one is wanted: itself, or the best; 0 where the machine has it not. */
+VI_DOOR int vi_door_lanes_instructions(int wanted);
+
+#endif
