@@ -1,0 +1,64 @@
+/* Eight lanes: where their bodies are, and tables of their motion; arrays end in [lane], as vector registers take them.
+ *
+ * Time goes by cells of one length for each lane. The motion over a cell is a Taylor polynomial in the share of the cell,
+ * linear in (q, p, cosine, sine, 1) at its start: a table of coefficients for each of these five. The states at the ends of
+ * the next VI_CELLS cells follow likewise. Nothing here needs a steady response, so resonance, critical damping and slow
+ * forcing are like any other motion.
+ */
+#ifndef VIBROIMPACT_LANE_GROUP_H
+#define VIBROIMPACT_LANE_GROUP_H
+
+#include <stdint.h>
+
+#include "lanes/lanes.h"
+
+enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 };
+
+/* What a motion is linear in, in the order of the tables. */
+enum { VI_OF_Q, VI_OF_P, VI_OF_COSINE, VI_OF_SINE, VI_OF_ONE, VI_PARTS };
+
+/* A lane needs more than lockstep. */
+enum {
+    VI_EVENT_NONE = 0,
+    VI_EVENT_IMPACT = 1, /* that is to be told */
+    VI_EVENT_GOAL = 2,   /* it has come to its goal */
+    VI_EVENT_CELL = 3,   /* the cell `passed` after the start of the round is for the careful search */
+    VI_EVENT_LEAVE = 4,  /* it is for the scalar engine */
+    VI_EVENT_FLIGHT = 5  /* nothing, but its extremes are followed */
+};
+
+typedef double vi_lane_array[VI_LANES];
+
+typedef struct {
+    /* tables of one mode */
+    vi_lane_array taylor[VI_LANE_ORDER + 1][VI_PARTS]; /* of q over a cell */
+    vi_lane_array end_q[VI_CELLS + 1][VI_PARTS], end_p[VI_CELLS + 1][VI_PARTS]; /* after whole cells */
+    vi_lane_array turn_cosine[VI_CELLS + 1], turn_sine[VI_CELLS + 1]; /* of the force, likewise */
+    /* of the body */
+    vi_lane_array cell, cell_rate;                     /* s, 1/s */
+    vi_lane_array stiffness, angular_frequency, period, period_low;
+    vi_lane_array load, drag, root_rate;  /* |force| + |held|, 2 decay, 2 decay + natural */
+    vi_lane_array span;                   /* VI_CELLS cells, s */
+    vi_lane_array sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS]; /* free where sign q < limit */
+    vi_lane_array restitution[VI_LANES_CONTACTS], yield_velocity[VI_LANES_CONTACTS]; /* over |shape| */
+    vi_lane_array resolution[VI_LANES_CONTACTS]; /* squared approach below which a touch may be no impact */
+    vi_lane_array scale;                  /* of the stops, in units of q */
+    vi_lane_array most_impacts;           /* at this count the lane tells */
+    /* where it is */
+    vi_lane_array q, p;
+    vi_lane_array periods, rest, rest_low;
+    vi_lane_array goal_periods, goal_rest, goal_rest_low;
+    vi_lane_array on;             /* number of the contact that it has just left, from 1; 0: none */
+    vi_lane_array fastest_impact, impacts;
+    vi_lane_array tells, follows; /* 1: each impact is told; extremes are followed */
+    /* of the last round */
+    vi_lane_array start_q, start_p, start_cosine, start_sine;
+    vi_lane_array passed, share;  /* whole cells, and the part of the one after them */
+    vi_lane_array hit, approach;  /* number of the contact, from 1 (0: none), and speed, in units of q */
+    vi_lane_array event;
+} vi_lane_group;
+
+/* Move all lanes on together, round after round, until one of them has an event or some hundred rounds are over. */
+typedef void (*vi_lanes_rounds)(vi_lane_group *group, int contacts);
+
+#endif
