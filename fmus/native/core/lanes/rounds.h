@@ -93,6 +93,7 @@ LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setti
 LANES_INLINE vector gather(const vi_lane_array *rows, int stride, int at, const int row[])
 {
     vector found;
+#pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
         found[i] = rows[row[i] * stride][at + i];
     }
@@ -102,6 +103,7 @@ LANES_INLINE vector gather(const vi_lane_array *rows, int stride, int at, const 
 LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, candidate *cell)
 {
     int row[VI_WIDTH];
+#pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
         row[i] = (int)cell->passed[i];
     }

@@ -59,6 +59,7 @@ LANES_INLINE vector size_of(vector a)
 LANES_INLINE vector root(vector a)
 {
     vector r;
+#pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
         r[i] = sqrt(a[i]);
     }
@@ -68,6 +69,7 @@ LANES_INLINE vector root(vector a)
 LANES_INLINE bool any(mask where)
 {
     int64_t found = 0;
+#pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
         found |= where[i];
     }
