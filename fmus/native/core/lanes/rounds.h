@@ -4,6 +4,8 @@
 
 /* Rounds after which the caller is heard again. */
 enum { MOST_ROUNDS = 256 };
+/* Times that a lane may come through all its cells in one round. */
+enum { MOST_JUMPS = 2 };
 
 /* Rounding of a displacement, in units of the terms it is the sum of. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
@@ -13,7 +15,8 @@ enum { MOST_ROUNDS = 256 };
 /* Where the lanes of a vector are at the start of a round. */
 typedef struct {
     vector q, p, cosine, sine, on;
-    vector to_goal;             /* s */
+    vector to_goal;             /* cells */
+    vector jumped;              /* whole cells that the round has led through before */
     vector second, third, fourth; /* bounds of derivatives of q until VI_CELLS cells later, over a cell's powers */
 } setting;
 
@@ -29,27 +32,35 @@ typedef struct {
     vector q, p, cosine, sine; /* at its start */
 } candidate;
 
+/* Bounds of the derivatives of q until VI_CELLS cells later. */
+LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
+{
+    /* the energy norm grows by no more than the loads do; the derivatives follow from the equation */
+    const vector k = load(g->stiffness + at), loads = load(g->load + at), drag = load(g->drag + at);
+    const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
+    const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * load(g->span + at);
+    const vector second = loads + load(g->root_rate + at) * norm;
+    const vector third = w * loads + (drag * second + k * norm);
+    const vector fourth = w * (w * loads) + (drag * third + k * second);
+    s->second = second * square;
+    s->third = third * (square * cell);
+    s->fourth = fourth * (square * square);
+}
+
 LANES_INLINE setting begin_round(const vi_lane_group *g, int at)
 {
     setting s;
     s.q = load(g->q + at);
     s.p = load(g->p + at);
     s.on = load(g->on + at);
-    const vector rest = load(g->rest + at), w = load(g->angular_frequency + at), cell = load(g->cell + at);
-    turn(w * rest, &s.cosine, &s.sine);
+    const vector rest = load(g->rest + at);
+    turn(load(g->angular_frequency + at) * rest, &s.cosine, &s.sine);
     const vector whole = load(g->goal_periods + at) - load(g->periods + at);
-    s.to_goal = (whole * load(g->period + at) + (load(g->goal_rest + at) - rest))
-                + (whole * load(g->period_low + at) + (load(g->goal_rest_low + at) - load(g->rest_low + at)));
-    /* the energy norm grows by no more than the loads do; the derivatives follow from the equation */
-    const vector k = load(g->stiffness + at), loads = load(g->load + at), drag = load(g->drag + at);
-    const vector norm = root(s.p * s.p + k * (s.q * s.q)) + loads * load(g->span + at);
-    const vector second = loads + load(g->root_rate + at) * norm;
-    const vector third = w * loads + (drag * second + k * norm);
-    const vector fourth = w * (w * loads) + (drag * third + k * second);
-    const vector square = cell * cell;
-    s.second = second * square;
-    s.third = third * (square * cell);
-    s.fourth = fourth * (square * square);
+    const vector high = whole * load(g->period + at) + (load(g->goal_rest + at) - rest);
+    const vector low = whole * load(g->period_low + at) + (load(g->goal_rest_low + at) - load(g->rest_low + at));
+    s.to_goal = larger((high + low) * load(g->cell_rate + at), all(0.0));
+    s.jumped = all(0.0);
+    bound(g, at, &s);
     return s;
 }
 
@@ -121,20 +132,54 @@ LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, c
     cell->sine = s->sine * c + s->cosine * n;
 }
 
-LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts, const setting *s)
+/* Whole cells that a lane surely comes through: no contact in them, and not beyond the goal. */
+LANES_INLINE vector sure_cells(const setting *s, int contacts, const vector count[], vector *cleared)
+{
+    *cleared = all((double)VI_CELLS);
+    for (int c = 0; c < contacts; ++c) {
+        *cleared = smaller(count[c], *cleared);
+    }
+    return smaller(*cleared, whole_part(smaller(s->to_goal, all((double)VI_CELLS))));
+}
+
+/* Lanes that come through all their cells go on from there in the same round. */
+LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, setting *s)
+{
+    const vi_lane_array *q = g->end_q[VI_CELLS], *p = g->end_p[VI_CELLS];
+    const vector c = load(g->turn_cosine[VI_CELLS] + at), n = load(g->turn_sine[VI_CELLS] + at);
+    const vector next_q = (load(q[VI_OF_Q] + at) * s->q + load(q[VI_OF_P] + at) * s->p)
+                          + ((load(q[VI_OF_COSINE] + at) * s->cosine + load(q[VI_OF_SINE] + at) * s->sine)
+                             + load(q[VI_OF_ONE] + at));
+    const vector next_p = (load(p[VI_OF_Q] + at) * s->q + load(p[VI_OF_P] + at) * s->p)
+                          + ((load(p[VI_OF_COSINE] + at) * s->cosine + load(p[VI_OF_SINE] + at) * s->sine)
+                             + load(p[VI_OF_ONE] + at));
+    const vector cosine = s->cosine * c - s->sine * n, sine = s->sine * c + s->cosine * n;
+    s->q = choose(jumps, next_q, s->q);
+    s->p = choose(jumps, next_p, s->p);
+    s->cosine = choose(jumps, cosine, s->cosine);
+    s->sine = choose(jumps, sine, s->sine);
+    s->on = only(~jumps, s->on);
+    s->jumped += only(jumps, all((double)VI_CELLS));
+    s->to_goal -= only(jumps, all((double)VI_CELLS));
+    bound(g, at, s);
+}
+
+LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts, setting *s)
 {
     candidate cell;
-    vector count[VI_LANES_CONTACTS];
-    scan(g, at, contacts, s, count);
-    vector cleared = all((double)VI_CELLS);
-    for (int c = 0; c < contacts; ++c) {
-        cleared = smaller(count[c], cleared);
+    vector count[VI_LANES_CONTACTS], cleared;
+    const mask alone = load(g->follows + at) == 0.0;
+    for (int i = 0;; ++i) {
+        scan(g, at, contacts, s, count);
+        cell.passed = sure_cells(s, contacts, count, &cleared);
+        const mask jumps = alone & (cell.passed == (double)VI_CELLS);
+        if (i == MOST_JUMPS || !any(jumps)) {
+            break;
+        }
+        jump(g, at, jumps, s);
     }
-    const vector to_goal = s->to_goal * load(g->cell_rate + at);
-    const vector before_goal = whole_part(smaller(larger(to_goal, all(0.0)), all((double)VI_CELLS)));
-    cell.passed = smaller(cleared, before_goal);
     const mask jumps = cell.passed == (double)VI_CELLS;
-    const vector length = larger(to_goal - cell.passed, all(0.0));
+    const vector length = larger(s->to_goal - cell.passed, all(0.0));
     cell.length = only(~jumps, smaller(length, all(1.0)));
     cell.goal = ~jumps & (length <= 1.0);
     cell.searched = ~jumps & (cleared == cell.passed);
@@ -178,6 +223,22 @@ LANES_INLINE void follow(const vector term[], vector share, vector *added, vecto
     *slope = v;
 }
 
+/* One step towards the zero of y + sign * (what the polynomial adds), of third order (Chebyshev's). */
+LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
+{
+    vector x = term[VI_LANE_ORDER], v = x * 0.0, a = v;
+#pragma GCC unroll 16
+    for (int n = VI_LANE_ORDER - 1; n >= 1; --n) {
+        a = a * share + v;
+        v = v * share + x;
+        x = x * share + term[n];
+    }
+    /* of the polynomial over its share: what is left is one order lower */
+    const vector slope = v * share + x, bend = a * share + v;
+    const vector step = (y + sign * (x * share)) / (sign * slope);
+    return share - step * (1.0 + step * (bend / slope));
+}
+
 /* Where a rising cubic's inverse has its zero: the first guess of the contact. */
 LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end_slope, vector length)
 {
@@ -215,10 +276,9 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, co
     a.share = length;
     if (any(a.hits)) {
         vector share = first_guess(y, first, end_y, end_slope, length);
-        for (int i = 0; i < 2; ++i) {
-            follow(term, share, &added, &slope);
-            share = smaller(larger(share - (y + cell->sign * added) / (cell->sign * slope), all(0.0)), length);
-        }
+        share = smaller(larger(closer(term, y, cell->sign, share), all(0.0)), length);
+        follow(term, share, &added, &slope);
+        share = smaller(larger(share - (y + cell->sign * added) / (cell->sign * slope), all(0.0)), length);
         a.share = choose(a.hits, share, length);
         follow(term, a.share, &added, &slope);
         const mask lost = a.hits & ~(size_of(y + cell->sign * added) <= noise);
@@ -255,30 +315,26 @@ LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidat
     return leaves;
 }
 
-/* Move the clocks: those at the goal are there exactly. */
-LANES_INLINE void move_clock(vi_lane_group *g, int at, const candidate *cell, const arrival *a, mask stays, mask arrives)
+/* Move the clocks by whole cells, which are exact, and a part of one; those at the goal are there exactly. */
+LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector share, mask arrives)
 {
-    const vector length = load(g->cell + at), period = load(g->period + at), period_low = load(g->period_low + at);
-    const vector rest = load(g->rest + at), low = load(g->rest_low + at), periods = load(g->periods + at);
-    const vector whole = cell->passed * length, part = a->share * length; /* the first is exact */
+    const vector length = load(g->cell + at), period = load(g->period + at);
+    const vector rest = load(g->rest + at), whole = cells * length, part = share * length;
     const vector first = rest + whole, second = first + part;
-    const vector error = (error_of_sum(rest, whole, first) + error_of_sum(first, part, second)) + low;
-    const mask over = second >= period;
-    const vector left = second - only(over, period), over_low = error - only(over, period_low);
-    const vector high = left + over_low;
-    vector after = high, after_low = over_low - (high - left), count = periods + only(over, all(1.0));
-    after = choose(arrives, load(g->goal_rest + at), choose(stays, rest, after));
-    after_low = choose(arrives, load(g->goal_rest_low + at), choose(stays, low, after_low));
-    count = choose(arrives, load(g->goal_periods + at), choose(stays, periods, count));
-    store(g->rest + at, after);
-    store(g->rest_low + at, after_low);
-    store(g->periods + at, count);
+    const vector error = error_of_sum(rest, whole, first) + error_of_sum(first, part, second);
+    const vector turns = only(second >= period, all(1.0)) + only(second >= 2.0 * period, all(1.0));
+    const vector left = second - turns * period;
+    const vector low = (error + load(g->rest_low + at)) - turns * load(g->period_low + at);
+    const vector after = left + low;
+    store(g->rest + at, choose(arrives, load(g->goal_rest + at), after));
+    store(g->rest_low + at, choose(arrives, load(g->goal_rest_low + at), low - (after - left)));
+    store(g->periods + at, choose(arrives, load(g->goal_periods + at), load(g->periods + at) + turns));
 }
 
 /* One round of a vector of lanes; true when one of them has an event. */
 LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
 {
-    const setting s = begin_round(g, at);
+    setting s = begin_round(g, at);
     const candidate cell = choose_cell(g, at, contacts, &s);
     arrival a = search(g, at, &s, &cell);
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
@@ -295,7 +351,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     store(g->q + at, choose(moves, a.q, s.q));
     store(g->p + at, choose(moves, a.p, s.p));
     store(g->on + at, choose(moves, only(a.hits, cell.number), s.on));
-    move_clock(g, at, &cell, &a, a.careful, arrives);
+    move_clock(g, at, s.jumped + only(moves, cell.passed), only(moves, a.share), arrives);
     vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
     event = choose(a.hits & tells, all((double)VI_EVENT_IMPACT), event);
     event = choose(arrives, all((double)VI_EVENT_GOAL), event);
