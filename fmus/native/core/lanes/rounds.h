@@ -5,7 +5,7 @@
 /* Rounds after which the caller is heard again. */
 enum { MOST_ROUNDS = 256 };
 /* Times that a lane may come through all its cells in one round. */
-enum { MOST_JUMPS = 2 };
+enum { MOST_JUMPS = 3 };
 
 /* Rounding of a displacement, in units of the terms it is the sum of. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
@@ -276,9 +276,9 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, co
     a.share = length;
     if (any(a.hits)) {
         vector share = first_guess(y, first, end_y, end_slope, length);
-        share = smaller(larger(closer(term, y, cell->sign, share), all(0.0)), length);
-        follow(term, share, &added, &slope);
-        share = smaller(larger(share - (y + cell->sign * added) / (cell->sign * slope), all(0.0)), length);
+        for (int i = 0; i < 2; ++i) {
+            share = smaller(larger(closer(term, y, cell->sign, share), all(0.0)), length);
+        }
         a.share = choose(a.hits, share, length);
         follow(term, a.share, &added, &slope);
         const mask lost = a.hits & ~(size_of(y + cell->sign * added) <= noise);
@@ -322,8 +322,11 @@ LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector shar
     const vector rest = load(g->rest + at), whole = cells * length, part = share * length;
     const vector first = rest + whole, second = first + part;
     const vector error = error_of_sum(rest, whole, first) + error_of_sum(first, part, second);
-    const vector turns = only(second >= period, all(1.0)) + only(second >= 2.0 * period, all(1.0));
-    const vector left = second - turns * period;
+    /* less than four periods: both subtractions are exact */
+    const mask two = second >= 2.0 * period;
+    const vector less = second - only(two, 2.0 * period);
+    const mask one = less >= period;
+    const vector left = less - only(one, period), turns = only(two, all(2.0)) + only(one, all(1.0));
     const vector low = (error + load(g->rest_low + at)) - turns * load(g->period_low + at);
     const vector after = left + low;
     store(g->rest + at, choose(arrives, load(g->goal_rest + at), after));
