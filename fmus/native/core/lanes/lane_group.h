@@ -14,6 +14,9 @@
 
 enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 };
 
+/* A rebound below this share of the largest approach may begin the end of a chatter: as chatter.c has it. */
+#define VI_LANE_TAIL 1e-4
+
 /* What a motion is linear in, in the order of the tables. */
 enum { VI_OF_Q, VI_OF_P, VI_OF_COSINE, VI_OF_SINE, VI_OF_ONE, VI_PARTS };
 
@@ -22,40 +25,45 @@ enum {
     VI_EVENT_NONE = 0,
     VI_EVENT_IMPACT = 1, /* that is to be told */
     VI_EVENT_GOAL = 2,   /* it has come to its goal */
-    VI_EVENT_CELL = 3,   /* the cell `passed` after the start of the round is for the careful search */
+    VI_EVENT_CELL = 3,   /* the cell that begins where it is now is for the careful search */
     VI_EVENT_LEAVE = 4,  /* it is for the scalar engine */
     VI_EVENT_FLIGHT = 5  /* nothing, but its extremes are followed */
 };
 
 typedef double vi_lane_array[VI_LANES];
 
+/* Tables of a body of one mode. Its motion over a cell is linear in the five parts at the start. */
 typedef struct {
-    /* tables of one mode */
     vi_lane_array taylor[VI_LANE_ORDER + 1][VI_PARTS]; /* of q over a cell */
     vi_lane_array end_q[VI_CELLS + 1][VI_PARTS], end_p[VI_CELLS + 1][VI_PARTS]; /* after whole cells */
     vi_lane_array turn_cosine[VI_CELLS + 1], turn_sine[VI_CELLS + 1]; /* of the force, likewise */
+    vi_lane_array stiffness, drag, root_rate; /* 2 decay, 2 decay + natural */
+    vi_lane_array load;                       /* |force| + |held| */
+    vi_lane_array span;                       /* VI_CELLS cells, s */
+    vi_lane_array observed;                   /* shape of the observed point */
+} vi_one_mode;
+
+typedef struct {
     /* of the body */
-    vi_lane_array cell, cell_rate;                     /* s, 1/s */
-    vi_lane_array stiffness, angular_frequency, period, period_low;
-    vi_lane_array load, drag, root_rate;  /* |force| + |held|, 2 decay, 2 decay + natural */
-    vi_lane_array span;                   /* VI_CELLS cells, s */
-    vi_lane_array sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS]; /* free where sign q < limit */
-    vi_lane_array restitution[VI_LANES_CONTACTS], yield_velocity[VI_LANES_CONTACTS]; /* over |shape| */
+    vi_lane_array cell, cell_rate;            /* shortest length of a cell, s; 1/s */
+    vi_lane_array angular_frequency, period, period_low;
+    vi_lane_array sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS]; /* one mode: free where sign q < limit */
+    vi_lane_array restitution[VI_LANES_CONTACTS], yield_velocity[VI_LANES_CONTACTS]; /* one mode: over |shape| */
     vi_lane_array resolution[VI_LANES_CONTACTS]; /* squared approach below which a touch may be no impact */
-    vi_lane_array scale;                  /* of the stops, in units of q */
-    vi_lane_array most_impacts;           /* at this count the lane tells */
-    /* where it is */
-    vi_lane_array q, p;
+    vi_lane_array most_impacts;               /* at this count the lane tells */
+    /* where it is: modal displacements and velocities; of several modes, without the steady response and the level */
+    vi_lane_array q[VI_LANES_MODES], p[VI_LANES_MODES];
     vi_lane_array periods, rest, rest_low;
     vi_lane_array goal_periods, goal_rest, goal_rest_low;
-    vi_lane_array on;             /* number of the contact that it has just left, from 1; 0: none */
+    vi_lane_array on;                         /* number of the contact that it has just left, from 1; 0: none */
     vi_lane_array fastest_impact, impacts;
-    vi_lane_array tells, follows; /* 1: each impact is told; extremes are followed */
-    /* of the last round */
-    vi_lane_array start_q, start_p, start_cosine, start_sine;
-    vi_lane_array passed, share;  /* whole cells, and the part of the one after them */
-    vi_lane_array hit, approach;  /* number of the contact, from 1 (0: none), and speed, in units of q */
+    vi_lane_array tells, follows;             /* 1: each impact is told; extremes are followed */
+    /* of the last round: from where it went through whole cells and a share of one more */
+    vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
+    vi_lane_array passed, share;
+    vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed */
     vi_lane_array event;
+    vi_one_mode one;
 } vi_lane_group;
 
 /* Move all lanes on together, round after round, until one of them has an event or some hundred rounds are over. */

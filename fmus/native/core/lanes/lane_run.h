@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "lanes/lane_group.h"
+#include "lanes/lane_body.h"
 #include "motion/clock.h"
 
 /* The run in a lane, beside what the group holds of it. */
@@ -14,17 +14,17 @@ typedef struct {
     vi_clock clock;
     vi_instant begin, end;  /* of the recording */
     bool recording, goal_is_period;
-    double observed;        /* shape of the observed point */
-    double unit[VI_LANES_CONTACTS];    /* m for q = 1 at a contact: |shape| */
+    double unit[VI_LANES_CONTACTS];    /* m/s of the group's speeds: |shape| of one mode */
     double impulse[VI_LANES_CONTACTS]; /* N s that change the speed of a contact by 1 m/s */
     bool period_open;
     double period_start, strobe_displacement, strobe_velocity, impacts_before; /* of the period now open */
-    double highest, lowest; /* of q in it */
+    double highest, lowest; /* displacement in it */
 } vi_lane_run;
 
 /* What a lane does with points, for the length of a call. */
 typedef struct {
     const vi_lanes_plan *plan;
+    const vi_lane_body *body;
     vi_lanes_points *points;
     vi_lane_group *group;
     vi_lane_run *run; /* [VI_LANES] */

@@ -62,11 +62,11 @@ static step joined(const step *a, const step *b)
 static void store(vi_lane_group *group, int lane, int cells, const step *s)
 {
     for (int part = 0; part < VI_PARTS; ++part) {
-        group->end_q[cells][part][lane] = s->q[part];
-        group->end_p[cells][part][lane] = s->p[part];
+        group->one.end_q[cells][part][lane] = s->q[part];
+        group->one.end_p[cells][part][lane] = s->p[part];
     }
-    group->turn_cosine[cells][lane] = s->cosine;
-    group->turn_sine[cells][lane] = s->sine;
+    group->one.turn_cosine[cells][lane] = s->cosine;
+    group->one.turn_sine[cells][lane] = s->sine;
 }
 
 void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, double cell)
@@ -79,7 +79,7 @@ void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, do
         for (int n = VI_LANE_ORDER; n >= 0; --n) { /* the smallest first */
             q += term[n];
             slope += n * term[n];
-            group->taylor[n][part][lane] = term[n];
+            group->one.taylor[n][part][lane] = term[n];
         }
         after[1].q[part] = q;
         after[1].p[part] = slope / cell;

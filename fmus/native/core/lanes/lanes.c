@@ -85,7 +85,7 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
     const double call = vi_seconds_now();
     const vi_lanes_rounds rounds = vi_lanes_rounds_of(plan->instructions);
     under_way *now = aligned(memory);
-    vi_lanes_work work = {plan, points, &now->group, now->run, 0};
+    vi_lanes_work work = {plan, &vi_lane_one_mode, points, &now->group, now->run, 0};
     begin(&work, now);
     for (int unheard = 0;; ++unheard) {
         if (points->rows_room - points->rows_used < MOST_ROWS) {

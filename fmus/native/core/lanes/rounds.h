@@ -9,8 +9,6 @@ enum { MOST_JUMPS = 3 };
 
 /* Rounding of a displacement, in units of the terms it is the sum of. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
-/* A rebound below this share of the largest approach may begin the end of a chatter: as chatter.c has it. */
-#define TAIL_VELOCITY 1e-4
 
 /* Where the lanes of a vector are at the start of a round. */
 typedef struct {
@@ -36,10 +34,10 @@ typedef struct {
 LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
 {
     /* the energy norm grows by no more than the loads do; the derivatives follow from the equation */
-    const vector k = load(g->stiffness + at), loads = load(g->load + at), drag = load(g->drag + at);
+    const vector k = load(g->one.stiffness + at), loads = load(g->one.load + at), drag = load(g->one.drag + at);
     const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
-    const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * load(g->span + at);
-    const vector second = loads + load(g->root_rate + at) * norm;
+    const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * load(g->one.span + at);
+    const vector second = loads + load(g->one.root_rate + at) * norm;
     const vector third = w * loads + (drag * second + k * norm);
     const vector fourth = w * (w * loads) + (drag * third + k * second);
     s->second = second * square;
@@ -50,8 +48,8 @@ LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
 LANES_INLINE setting begin_round(const vi_lane_group *g, int at)
 {
     setting s;
-    s.q = load(g->q + at);
-    s.p = load(g->p + at);
+    s.q = load(g->q[0] + at);
+    s.p = load(g->p[0] + at);
     s.on = load(g->on + at);
     const vector rest = load(g->rest + at);
     turn(load(g->angular_frequency + at) * rest, &s.cosine, &s.sine);
@@ -79,7 +77,7 @@ LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setti
     }
 #pragma GCC unroll 8
     for (int i = 1; i <= VI_CELLS; ++i) {
-        const vi_lane_array *table = g->end_q[i];
+        const vi_lane_array *table = g->one.end_q[i];
         const vector q = (load(table[VI_OF_Q] + at) * s->q + load(table[VI_OF_P] + at) * s->p)
                          + ((load(table[VI_OF_COSINE] + at) * s->cosine + load(table[VI_OF_SINE] + at) * s->sine)
                             + load(table[VI_OF_ONE] + at));
@@ -118,7 +116,7 @@ LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, c
     for (int i = 0; i < VI_WIDTH; ++i) {
         row[i] = (int)cell->passed[i];
     }
-    const vi_lane_array *q = g->end_q[0], *p = g->end_p[0];
+    const vi_lane_array *q = g->one.end_q[0], *p = g->one.end_p[0];
     cell->q = (gather(q + VI_OF_Q, VI_PARTS, at, row) * s->q + gather(q + VI_OF_P, VI_PARTS, at, row) * s->p)
               + ((gather(q + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
                   + gather(q + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
@@ -127,7 +125,7 @@ LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, c
               + ((gather(p + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
                   + gather(p + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
                  + gather(p + VI_OF_ONE, VI_PARTS, at, row));
-    const vector c = gather(g->turn_cosine, 1, at, row), n = gather(g->turn_sine, 1, at, row);
+    const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
     cell->cosine = s->cosine * c - s->sine * n;
     cell->sine = s->sine * c + s->cosine * n;
 }
@@ -145,8 +143,8 @@ LANES_INLINE vector sure_cells(const setting *s, int contacts, const vector coun
 /* Lanes that come through all their cells go on from there in the same round. */
 LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, setting *s)
 {
-    const vi_lane_array *q = g->end_q[VI_CELLS], *p = g->end_p[VI_CELLS];
-    const vector c = load(g->turn_cosine[VI_CELLS] + at), n = load(g->turn_sine[VI_CELLS] + at);
+    const vi_lane_array *q = g->one.end_q[VI_CELLS], *p = g->one.end_p[VI_CELLS];
+    const vector c = load(g->one.turn_cosine[VI_CELLS] + at), n = load(g->one.turn_sine[VI_CELLS] + at);
     const vector next_q = (load(q[VI_OF_Q] + at) * s->q + load(q[VI_OF_P] + at) * s->p)
                           + ((load(q[VI_OF_COSINE] + at) * s->cosine + load(q[VI_OF_SINE] + at) * s->sine)
                              + load(q[VI_OF_ONE] + at));
@@ -203,7 +201,7 @@ LANES_INLINE void expand(const vi_lane_group *g, int at, const candidate *cell, 
     term[1] = cell->p * load(g->cell + at);
 #pragma GCC unroll 16
     for (int n = 2; n <= VI_LANE_ORDER; ++n) {
-        const vi_lane_array *table = g->taylor[n];
+        const vi_lane_array *table = g->one.taylor[n];
         term[n] = (load(table[VI_OF_Q] + at) * cell->q + load(table[VI_OF_P] + at) * cell->p)
                   + ((load(table[VI_OF_COSINE] + at) * cell->cosine + load(table[VI_OF_SINE] + at) * cell->sine)
                      + load(table[VI_OF_ONE] + at));
@@ -307,7 +305,7 @@ LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidat
     }
     const vector after = restitution * approach;
     const vector fastest = larger(load(g->fastest_impact + at), only(a->hits, approach));
-    const mask leaves = a->hits & ~((after > TAIL_VELOCITY * fastest) & (approach * approach > resolution));
+    const mask leaves = a->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
     store(g->fastest_impact + at, fastest);
     store(g->hit + at, only(a->hits, cell->number));
     store(g->approach + at, only(a->hits, approach));
@@ -341,20 +339,20 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     const candidate cell = choose_cell(g, at, contacts, &s);
     arrival a = search(g, at, &s, &cell);
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
-    const mask arrives = cell.goal & ~a.hits & moves;
-    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0));
+    const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
+    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
     const mask tells = (load(g->tells + at) > 0.0) | (impacts >= load(g->most_impacts + at));
-    store(g->start_q + at, s.q);
-    store(g->start_p + at, s.p);
+    store(g->start_q[0] + at, s.q);
+    store(g->start_p[0] + at, s.p);
     store(g->start_cosine + at, s.cosine);
     store(g->start_sine + at, s.sine);
     store(g->passed + at, cell.passed);
-    store(g->share + at, a.share);
+    store(g->share + at, share);
     store(g->impacts + at, impacts);
-    store(g->q + at, choose(moves, a.q, s.q));
-    store(g->p + at, choose(moves, a.p, s.p));
-    store(g->on + at, choose(moves, only(a.hits, cell.number), s.on));
-    move_clock(g, at, s.jumped + only(moves, cell.passed), only(moves, a.share), arrives);
+    store(g->q[0] + at, choose(moves, a.q, cell.q));
+    store(g->p[0] + at, choose(moves, a.p, cell.p));
+    store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
+    move_clock(g, at, s.jumped + cell.passed, share, arrives);
     vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
     event = choose(a.hits & tells, all((double)VI_EVENT_IMPACT), event);
     event = choose(arrives, all((double)VI_EVENT_GOAL), event);
