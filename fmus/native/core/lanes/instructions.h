@@ -10,8 +10,8 @@ int vi_lanes_instructions(int wanted);
 /* The rounds compiled for it; NULL where the machine has it not. */
 vi_lanes_rounds vi_lanes_rounds_of(int wanted);
 
-void vi_lanes_rounds_baseline(vi_lane_group *group, int contacts);
-void vi_lanes_rounds_avx2(vi_lane_group *group, int contacts);
-void vi_lanes_rounds_avx512(vi_lane_group *group, int contacts);
+void vi_lanes_rounds_baseline(vi_lane_group *group, int modes, int contacts);
+void vi_lanes_rounds_avx2(vi_lane_group *group, int modes, int contacts);
+void vi_lanes_rounds_avx512(vi_lane_group *group, int modes, int contacts);
 
 #endif

@@ -17,15 +17,15 @@ typedef struct {
     bool (*take)(vi_lane_group *group, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points, int64_t point,
                  const double q[], const double p[]);
     /* From where it is, look for the first contact up to *share of a cell; then the lane is where *share says. */
-    vi_cell_result (*search)(vi_lane_group *group, int lane, int contacts, double *share, vi_lane_meeting *met);
+    vi_cell_result (*search)(vi_lane_group *group, int lane, int modes, int contacts, double *share, vi_lane_meeting *met);
     /* Turn the velocity of a contact, just met, into a rebound at this speed; false for a touch that may be none. */
-    bool (*rebound)(vi_lane_group *group, int lane, const vi_lane_meeting *met, double after);
+    bool (*rebound)(vi_lane_group *group, int lane, int modes, const vi_lane_meeting *met, double after);
     /* Extend the range of the observed displacement by what the lane went through in its last round. */
-    void (*extremes)(const vi_lane_group *group, int lane, int contacts, double *highest, double *lowest);
+    void (*extremes)(const vi_lane_group *group, int lane, int modes, int contacts, double *highest, double *lowest);
     /* The observed displacement and velocity; a body of one mode is not beyond a stop but for rounding, and put there. */
-    void (*observe)(vi_lane_group *group, int lane, int contacts, double *displacement, double *velocity);
+    void (*observe)(vi_lane_group *group, int lane, int modes, int contacts, double *displacement, double *velocity);
     /* Modal displacements and velocities. */
-    void (*state)(const vi_lane_group *group, int lane, double q[], double p[]);
+    void (*state)(const vi_lane_group *group, int lane, int modes, double q[], double p[]);
 } vi_lane_body;
 
 extern const vi_lane_body vi_lane_one_mode, vi_lane_many_modes;

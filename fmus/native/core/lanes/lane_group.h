@@ -43,6 +43,30 @@ typedef struct {
     vi_lane_array observed;                   /* shape of the observed point */
 } vi_one_mode;
 
+/* Lengths of cells of a body of several modes: each of the next is a quarter of the one before. */
+enum { VI_LEVELS = 5, VI_POINTS = VI_LANES_CONTACTS + 1 };
+
+/* Tables of a body of several modes. Its motion is the steady response, and what each mode does without a force. Rows of
+ * points are those of the contacts, towards their stops, then the observed point's. */
+typedef struct {
+    vi_lane_array step[VI_LEVELS][VI_LANES_MODES][4]; /* (q, p) after a cell: q of q, of p; p of q, of p */
+    vi_lane_array turn_cosine[VI_LEVELS], turn_sine[VI_LEVELS];
+    vi_lane_array cells[VI_LEVELS], rate[VI_LEVELS];  /* length of a cell in shortest ones; 1/s */
+    /* most that a displacement, for unit amplitudes of the modes and of the force, differs from a line over a cell */
+    vi_lane_array bulge[VI_LEVELS][VI_POINTS][VI_LANES_MODES + 1];
+    vi_lane_array tilt[VI_LEVELS][VI_LANES_MODES + 1]; /* the same of the observed point's velocity */
+    vi_lane_array leaving[VI_LANES_CONTACTS][VI_LANES_MODES + 1]; /* third derivative / 24 over a shortest cell's cube */
+    vi_lane_array shape[VI_POINTS][VI_LANES_MODES];
+    vi_lane_array cosine[VI_POINTS], sine[VI_POINTS], offset[VI_POINTS]; /* steady response; level less the stop */
+    vi_lane_array mix[VI_LANES_MODES], reach[VI_LANES_MODES]; /* amplitude |q| + |p + mix q| reach, or less */
+    vi_lane_array level, start_level, last;           /* of the cells now; in the last round; of the shortest ones */
+    /* of the careful search */
+    vi_lane_array stiffness[VI_LANES_MODES], decay[VI_LANES_MODES];
+    vi_lane_array steady_cosine[VI_LANES_MODES], steady_sine[VI_LANES_MODES], rest[VI_LANES_MODES];
+    vi_lane_array kick[VI_LANES_CONTACTS][VI_LANES_MODES]; /* modal velocities that take a unit of approach */
+    vi_lane_array size[VI_LANES_CONTACTS];            /* of what does not move in a clearance, m */
+} vi_many_modes;
+
 typedef struct {
     /* of the body */
     vi_lane_array cell, cell_rate;            /* shortest length of a cell, s; 1/s */
@@ -64,9 +88,10 @@ typedef struct {
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed */
     vi_lane_array event;
     vi_one_mode one;
+    vi_many_modes many;
 } vi_lane_group;
 
 /* Move all lanes on together, round after round, until one of them has an event or some hundred rounds are over. */
-typedef void (*vi_lanes_rounds)(vi_lane_group *group, int contacts);
+typedef void (*vi_lanes_rounds)(vi_lane_group *group, int modes, int contacts);
 
 #endif

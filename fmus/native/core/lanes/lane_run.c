@@ -110,8 +110,8 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
     vi_lanes_points *points = w->points;
     const int64_t point = w->run[lane].point;
     double q[VI_LANES_MODES], p[VI_LANES_MODES], displacement, velocity;
-    w->body->observe(w->group, lane, w->plan->contacts, &displacement, &velocity);
-    w->body->state(w->group, lane, q, p);
+    w->body->observe(w->group, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
+    w->body->state(w->group, lane, w->plan->modes, q, p);
     if (!isfinite(displacement) || !isfinite(velocity)) {
         leave(w, lane);
         return;
@@ -136,7 +136,7 @@ static void arrive(vi_lanes_work *w, int lane)
     vi_lane_group *g = w->group;
     vi_lane_run *run = &w->run[lane];
     double displacement, velocity;
-    w->body->observe(g, lane, w->plan->contacts, &displacement, &velocity);
+    w->body->observe(g, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
     if (run->goal_is_period) {
         turn_period(w, lane, displacement, velocity);
     }
@@ -179,7 +179,7 @@ static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
     const vi_contact_law law = {.restitution = g->restitution[c][lane], .yield_velocity = g->yield_velocity[c][lane]};
     const double after = vi_contact_law_restitution(&law, met->approach) * met->approach;
     g->fastest_impact[lane] = vi_max(g->fastest_impact[lane], met->approach);
-    if (!w->body->rebound(g, lane, met, after) || !(after > VI_LANE_TAIL * g->fastest_impact[lane])) {
+    if (!w->body->rebound(g, lane, w->plan->modes, met, after) || !(after > VI_LANE_TAIL * g->fastest_impact[lane])) {
         return VI_EVENT_LEAVE;
     }
     g->on[lane] = g->hit[lane] = c + 1.0;
@@ -199,7 +199,7 @@ static int search(const vi_lanes_work *w, int lane)
     const double length = vi_clock_elapsed(clock, now, goal) * g->cell_rate[lane];
     double share = vi_max(0.0, vi_min(length, 1.0));
     vi_lane_meeting met;
-    const vi_cell_result result = w->body->search(g, lane, w->plan->contacts, &share, &met);
+    const vi_cell_result result = w->body->search(g, lane, w->plan->modes, w->plan->contacts, &share, &met);
     if (result == VI_CELL_UNDECIDED) {
         return VI_EVENT_LEAVE;
     }
@@ -215,7 +215,7 @@ static int search(const vi_lanes_work *w, int lane)
 static void follow_extremes(const vi_lanes_work *w, int lane)
 {
     if (w->group->follows[lane] > 0.0) {
-        w->body->extremes(w->group, lane, w->plan->contacts, &w->run[lane].highest, &w->run[lane].lowest);
+        w->body->extremes(w->group, lane, w->plan->modes, w->plan->contacts, &w->run[lane].highest, &w->run[lane].lowest);
     }
 }
 
@@ -251,11 +251,12 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
     }
     vi_lane_group *g = w->group;
     w->run[lane].point = -1;
-    g->cell_rate[lane] = g->period[lane] = 1.0;
+    g->cell_rate[lane] = g->period[lane] = g->many.rate[0][lane] = 1.0;
     g->goal_periods[lane] = 1e300;
     g->most_impacts[lane] = HUGE_VAL;
     for (int c = 0; c < VI_LANES_CONTACTS; ++c) {
         g->limit[c][lane] = 1.0;
+        g->many.offset[c][lane] = -1.0;
     }
 }
 

@@ -28,7 +28,7 @@ static under_way *aligned(void *memory)
 
 static bool is_plan(const vi_lanes_plan *plan)
 {
-    return plan->modes == 1 && plan->contacts >= 0 && plan->contacts <= VI_LANES_CONTACTS
+    return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= VI_LANES_CONTACTS
            && vi_lanes_rounds_of(plan->instructions) != NULL;
 }
 
@@ -85,7 +85,7 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
     const double call = vi_seconds_now();
     const vi_lanes_rounds rounds = vi_lanes_rounds_of(plan->instructions);
     under_way *now = aligned(memory);
-    vi_lanes_work work = {plan, &vi_lane_one_mode, points, &now->group, now->run, 0};
+    vi_lanes_work work = {plan, plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes, points, &now->group, now->run, 0};
     begin(&work, now);
     for (int unheard = 0;; ++unheard) {
         if (points->rows_room - points->rows_used < MOST_ROWS) {
@@ -101,7 +101,7 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
         if (!works(&work)) {
             break;
         }
-        rounds(&now->group, plan->contacts);
+        rounds(&now->group, plan->modes, plan->contacts);
         for (int lane = 0; lane < VI_LANES; ++lane) {
             vi_lane_attend(&work, lane);
         }

@@ -51,8 +51,9 @@ static vi_lane_cell towards(const vi_lane_group *g, int lane, int c, const vi_la
     return motion;
 }
 
-static vi_cell_result search(vi_lane_group *g, int lane, int contacts, double *share, vi_lane_meeting *met)
+static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts, double *share, vi_lane_meeting *met)
 {
+    (void)modes;
     g->start_q[0][lane] = g->q[0][lane];
     g->start_p[0][lane] = g->p[0][lane];
     vi_lane_turn(g->angular_frequency[lane] * g->rest[lane], &g->start_cosine[lane], &g->start_sine[lane]);
@@ -78,8 +79,9 @@ static vi_cell_result search(vi_lane_group *g, int lane, int contacts, double *s
     return result;
 }
 
-static bool rebound(vi_lane_group *g, int lane, const vi_lane_meeting *met, double after)
+static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting *met, double after)
 {
+    (void)modes;
     const double sign = g->sign[met->contact][lane];
     g->q[0][lane] = sign * g->limit[met->contact][lane];
     g->p[0][lane] = -sign * after;
@@ -127,8 +129,9 @@ static double extend(const vi_lane_group *g, int lane, int contacts, double sign
     return most;
 }
 
-static void extremes(const vi_lane_group *g, int lane, int contacts, double *highest, double *lowest)
+static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, double *highest, double *lowest)
 {
+    (void)modes;
     const double observed = g->one.observed[lane];
     const int passed = (int)g->passed[lane];
     double edge[VI_CELLS + 2];
@@ -147,8 +150,9 @@ static void extremes(const vi_lane_group *g, int lane, int contacts, double *hig
     *lowest = vi_min(*lowest, vi_min(most, least));
 }
 
-static void observe(vi_lane_group *g, int lane, int contacts, double *displacement, double *velocity)
+static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)
 {
+    (void)modes;
     for (int c = 0; c < contacts; ++c) {
         if (g->sign[c][lane] * g->q[0][lane] > g->limit[c][lane]) {
             g->q[0][lane] = g->sign[c][lane] * g->limit[c][lane];
@@ -158,8 +162,9 @@ static void observe(vi_lane_group *g, int lane, int contacts, double *displaceme
     *velocity = g->one.observed[lane] * g->p[0][lane];
 }
 
-static void state(const vi_lane_group *g, int lane, double q[], double p[])
+static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
 {
+    (void)modes;
     q[0] = g->q[0][lane];
     p[0] = g->p[0][lane];
 }

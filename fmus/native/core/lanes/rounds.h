@@ -45,18 +45,23 @@ LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
     s->fourth = fourth * (square * square);
 }
 
+/* What is left up to the goal, s. */
+LANES_INLINE vector seconds_to_goal(const vi_lane_group *g, int at)
+{
+    const vector whole = load(g->goal_periods + at) - load(g->periods + at);
+    const vector high = whole * load(g->period + at) + (load(g->goal_rest + at) - load(g->rest + at));
+    const vector low = whole * load(g->period_low + at) + (load(g->goal_rest_low + at) - load(g->rest_low + at));
+    return high + low;
+}
+
 LANES_INLINE setting begin_round(const vi_lane_group *g, int at)
 {
     setting s;
     s.q = load(g->q[0] + at);
     s.p = load(g->p[0] + at);
     s.on = load(g->on + at);
-    const vector rest = load(g->rest + at);
-    turn(load(g->angular_frequency + at) * rest, &s.cosine, &s.sine);
-    const vector whole = load(g->goal_periods + at) - load(g->periods + at);
-    const vector high = whole * load(g->period + at) + (load(g->goal_rest + at) - rest);
-    const vector low = whole * load(g->period_low + at) + (load(g->goal_rest_low + at) - load(g->rest_low + at));
-    s.to_goal = larger((high + low) * load(g->cell_rate + at), all(0.0));
+    turn(load(g->angular_frequency + at) * load(g->rest + at), &s.cosine, &s.sine);
+    s.to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
     s.jumped = all(0.0);
     bound(g, at, &s);
     return s;
@@ -372,9 +377,13 @@ LANES_INLINE void run_rounds(vi_lane_group *g, int contacts)
     }
 }
 
-void VI_ROUNDS(vi_lane_group *g, int contacts)
+#include "lanes/rounds_many.h"
+
+void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
 {
-    if (contacts == 0) {
+    if (modes > 1) {
+        run_rounds_many(g, modes, contacts);
+    } else if (contacts == 0) {
         run_rounds(g, 0);
     } else if (contacts == 1) {
         run_rounds(g, 1);
