@@ -141,10 +141,8 @@ double vi_lane_cell_crest(const vi_lane_cell *cell, double sign, double end)
     if (vi_min(first, last) > bulge || vi_max(first, last) < -bulge) {
         return -HUGE_VAL; /* monotone */
     }
-    /* the curvature keeps its sign: one crest, or none */
-    const double least = 2.0 * fabs(cell->term[2]);
-    if (first > 0.0 && last < 0.0 && least > third * end) {
-        return single_crest(cell, sign, end, first, last);
+    if (2.0 * fabs(cell->term[2]) > third * end) { /* the curvature keeps its sign: one crest, or none */
+        return first > 0.0 && last < 0.0 ? single_crest(cell, sign, end, first, last) : -HUGE_VAL;
     }
     return crest(cell, sign, end);
 }

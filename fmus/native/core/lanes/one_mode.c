@@ -90,13 +90,28 @@ static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting
 
 /* ---- extremes ---- */
 
-/* Bound of |second derivative| / 8 over the cells to come, over a cell's square: as the rounds have it. */
-static double bulge_of(const vi_lane_group *g, int lane)
+/* How far q may be from a line over one of the cells to come, and p from one: as the rounds bound them. */
+typedef struct {
+    double q, p;
+} bulges;
+
+static bulges bulges_of(const vi_lane_group *g, int lane)
 {
     const vi_one_mode *one = &g->one;
-    const double q = g->start_q[0][lane], p = g->start_p[0][lane], cell = g->cell[lane];
-    const double norm = sqrt(p * p + one->stiffness[lane] * (q * q)) + one->load[lane] * one->span[lane];
-    return 0.125 * (one->load[lane] + one->root_rate[lane] * norm) * cell * cell;
+    const double q = g->start_q[0][lane], p = g->start_p[0][lane], k = one->stiffness[lane], load = one->load[lane];
+    const double norm = sqrt(p * p + k * (q * q)) + load * one->span[lane];
+    const double second = load + one->root_rate[lane] * norm;
+    const double third = g->angular_frequency[lane] * load + (one->drag[lane] * second + k * norm);
+    const double eighth = 0.125 * g->cell[lane] * g->cell[lane];
+    return (bulges){second * eighth, third * eighth};
+}
+
+/* Does q rise, or fall, all through the cell after `passed`? */
+static bool is_monotone(const vi_lane_group *g, int lane, int passed, double bulge)
+{
+    const double first = after_cells(g->one.end_p[passed], g, lane);
+    const double last = after_cells(g->one.end_p[passed + 1], g, lane);
+    return vi_min(first, last) > bulge || vi_max(first, last) < -bulge;
 }
 
 /* How far the stops let q go on this side. */
@@ -112,15 +127,17 @@ static double stop_on(const vi_lane_group *g, int lane, int contacts, double sig
 }
 
 /* The largest sign * q, so far `most`, over the round whose cells end at edge[]. */
-static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[], double most)
+static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[],
+                     const bulges *bulge, double most)
 {
     const int passed = (int)g->passed[lane], last = g->share[lane] > 0.0 ? passed + 1 : passed;
-    const double stop = stop_on(g, lane, contacts, sign), bulge = bulge_of(g, lane);
+    const double stop = stop_on(g, lane, contacts, sign);
     for (int i = 0; i <= last; ++i) {
         most = vi_max(most, vi_min(stop, sign * edge[i]));
     }
     for (int i = 0; i < last && most < stop; ++i) {
-        if (vi_max(sign * edge[i], sign * edge[i + 1]) + bulge > most) {
+        if (vi_max(sign * edge[i], sign * edge[i + 1]) + bulge->q > most
+            && !(i < passed && is_monotone(g, lane, i, bulge->p))) {
             const vi_lane_cell cell = cell_after(g, lane, i);
             const double inside = vi_lane_cell_crest(&cell, sign, i < passed ? 1.0 : g->share[lane]);
             most = vi_max(most, vi_min(stop, inside));
@@ -133,6 +150,7 @@ static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, 
 {
     (void)modes;
     const double observed = g->one.observed[lane];
+    const bulges bulge = bulges_of(g, lane);
     const int passed = (int)g->passed[lane];
     double edge[VI_CELLS + 2];
     if (observed == 0.0) {
@@ -144,8 +162,8 @@ static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, 
     }
     edge[passed + 1] = g->q[0][lane];
     const double above = observed > 0.0 ? *highest : *lowest, below = observed > 0.0 ? *lowest : *highest;
-    const double most = observed * extend(g, lane, contacts, 1.0, edge, above / observed);
-    const double least = -observed * extend(g, lane, contacts, -1.0, edge, -below / observed);
+    const double most = observed * extend(g, lane, contacts, 1.0, edge, &bulge, above / observed);
+    const double least = -observed * extend(g, lane, contacts, -1.0, edge, &bulge, -below / observed);
     *highest = vi_max(*highest, vi_max(most, least));
     *lowest = vi_min(*lowest, vi_min(most, least));
 }
