@@ -383,10 +383,8 @@ void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
 {
     if (modes > 1) {
         run_rounds_many(g, modes, contacts);
-    } else if (contacts == 0) {
-        run_rounds(g, 0);
-    } else if (contacts == 1) {
-        run_rounds(g, 1);
+    } else if (contacts < 2) {
+        run_rounds(g, 1); /* without a contact its place is that of an idle lane: nothing meets it */
     } else {
         run_rounds(g, 2);
     }
