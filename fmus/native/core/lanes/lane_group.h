@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-#include "lanes/lanes.h"
+#include "lanes/lane_points.h"
 
 enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 };
 

@@ -260,12 +260,6 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
     }
 }
 
-bool vi_lane_is_contact(const vi_lanes_points *p, int64_t i)
-{
-    return fabs(p->direction[i]) == 1.0 && isfinite(p->position[i]) && p->restitution[i] >= 0.0
-           && p->restitution[i] <= 1.0 && p->yield_velocity[i] >= 0.0 && isfinite(p->yield_velocity[i]);
-}
-
 /* Its clock and the window of its recording; false where they are none. */
 static bool take_time(const vi_lanes_work *w, int lane, int64_t point)
 {
