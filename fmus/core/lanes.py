@@ -82,7 +82,8 @@ class LanesPoints(Structure):
 def _functions() -> tuple[Any, Any, Any]:
     library = core_library()
     run, memory, instructions = (
-        getattr(library, name) for name in ("vi_door_lanes", "vi_door_lanes_memory", "vi_door_lanes_instructions")
+        getattr(library, name)
+        for name in ("vi_door_lanes", "vi_door_lanes_memory", "vi_door_lanes_instructions")
     )
     run.argtypes = [POINTER(LanesPlan), POINTER(LanesPoints), c_void_p]
     memory.argtypes, memory.restype = [POINTER(LanesPlan)], c_size_t

@@ -1,4 +1,4 @@
-"""Points in lanes: what the scalar engines make of them, bit for bit the same in every instruction set and every cut."""
+"""Points in lanes do what the scalar engines make of them; every instruction set and cut gives the same bits."""
 
 import math
 

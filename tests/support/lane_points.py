@@ -81,7 +81,11 @@ def run(
     most_seconds : float
         Of one call.
     """
-    count, modes, contacts = points["angular_frequency"].size, len(points["stiffness"]), len(points["position"])
+    count, modes, contacts = (
+        points["angular_frequency"].size,
+        len(points["stiffness"]),
+        len(points["position"]),
+    )
     results: Columns = {
         "state": np.zeros(count, np.uint8),
         "outcome": np.zeros(count, np.int8),
@@ -114,7 +118,9 @@ def taken(points: Columns, places: NDArray[np.int64]) -> Columns:
     return {name: array[..., places] for name, array in points.items()}
 
 
-def drawn(count: int, modes: int, contacts: int, seed: int, *, transient: int = 3, recorded: int = 4) -> Columns:
+def drawn(
+    count: int, modes: int, contacts: int, seed: int, *, transient: int = 3, recorded: int = 4
+) -> Columns:
     """Draw points: light to strong damping, critical damping among it; forced, from phases of all quarters.
 
     Parameters
@@ -176,6 +182,8 @@ def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Struc
         )
         for k in range(len(p["position"]))
     ]
-    body = Structure(modes, stops, p["start_q"], p["start_p"], observed=p["observed"], extrema=True, periods=True)
+    body = Structure(
+        modes, stops, p["start_q"], p["start_p"], observed=p["observed"], extrema=True, periods=True
+    )
     body.advance(float(p["end"]), held=p["held"], most_impacts=impact_limit)
     return body
