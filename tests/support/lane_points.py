@@ -100,7 +100,9 @@ def run(
     for name, array in (given | results | block).items():
         setattr(state, name, address(array))
     memory = lanes_memory(plan)
-    ends, rows, owners = [], [], []
+    ends: list[LanesEnd] = []
+    rows: list[Array] = []
+    owners: list[NDArray[np.int64]] = []
     while not ends or ends[-1] in (LanesEnd.listen, LanesEnd.full):
         ends.append(run_lanes(plan, state, memory))
         rows.append(block["rows"][: state.rows_used].copy())
@@ -108,7 +110,9 @@ def run(
         state.rows_used = 0
     all_rows, all_owners = np.concatenate(rows), np.concatenate(owners)
     ran = results["state"] == PointState.has_run
-    own = [all_rows[all_owners == point] if ran[point] else all_rows[:0] for point in range(count)]
+    own: list[Array] = [
+        all_rows[all_owners == point] if ran[point] else all_rows[:0] for point in range(count)
+    ]
     assert [len(each) for each in own] == list(results["rows_of"] * ran)
     return Results(results, own, ends)
 

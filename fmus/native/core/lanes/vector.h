@@ -13,7 +13,12 @@
 typedef double vector __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 typedef int64_t mask __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 
+/* All of a round is one function; not under a sanitizer, whose checks in so large a one take minutes to compile. */
+#if defined(__SANITIZE_ADDRESS__)
+#define LANES_INLINE static inline
+#else
 #define LANES_INLINE static inline __attribute__((always_inline))
+#endif
 
 LANES_INLINE vector load(const double *from)
 {
