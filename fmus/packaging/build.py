@@ -192,7 +192,7 @@ def compile_component(
 
 def is_part(component: ComponentDescription, file: Path) -> bool:
     """Return whether a component has a file of the core; what is called by ctypes is in the core library alone."""
-    return file.parts[0] != "door" and component.uses(file.as_posix())
+    return file.parts[0] not in {"door", "lanes"} and component.uses(file.as_posix())
 
 
 def _write_versions(component: ComponentDescription, binary: bytes, output: Path) -> list[Path]:

@@ -15,6 +15,7 @@ FLOORS = (
     ("body",),
     ("body/modal",),
     ("door",),
+    ("lanes",),
 )
 
 INCLUDED = re.compile(r'^#include "([^"]+)"$', re.MULTILINE)

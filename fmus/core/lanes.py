@@ -1,0 +1,145 @@
+"""Many points at once: runs of one body in the lanes of the vector registers, in C."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_size_t, c_void_p
+from enum import IntEnum
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core.library import core_library
+from vibroimpact.fmus.errors import UsageError
+
+MOST_MODES = 8
+MOST_CONTACTS = 2
+LEAST_ROOM = 4096
+"""Rows that there must be room for."""
+
+CHOICE = "VIBROIMPACT_INSTRUCTIONS"
+
+
+class LanesEnd(IntEnum):
+    """Why `run_lanes` has returned; `lanes/lanes.h` says more."""
+
+    done = 0
+    listen = 1
+    full = 2
+    left = 3
+
+
+class PointState(IntEnum):
+    """How far a point is."""
+
+    waits = 0
+    runs = 1
+    has_run = 2
+    is_left = 3
+    is_answered = 4
+
+
+class Instructions(IntEnum):
+    """Instruction sets that the lanes are compiled for; `best` is what the machine has."""
+
+    best = 0
+    baseline = 1
+    avx2 = 2
+    avx512 = 3
+
+
+class LanesPlan(Structure):
+    """What all points have in common; `lanes/lanes.h` says what each field is."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("modes", "contacts", "impacts", "extrema", "periods", "instructions")),
+        ("impact_limit", c_int64),
+    ]
+
+
+class LanesPoints(Structure):
+    """The points, and what they come to; `lanes/lanes.h` says what each field is."""
+
+    GIVEN = (
+        "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "observed",
+        "position", "direction", "restitution", "yield_velocity", "start_q", "start_p", "begin", "end", "first",
+    )  # fmt: skip
+    RESULTS = (
+        "state", "outcome", "reached", "displacement", "velocity", "final_q", "final_p", "rows_of", "rows", "owner",
+    )  # fmt: skip
+    _fields_ = [
+        ("count", c_int64),
+        *((name, c_void_p) for name in (*GIVEN, *RESULTS)),
+        *((name, c_int64) for name in ("rows_room", "rows_used", "finished")),
+        ("most_seconds", c_double),
+    ]
+
+
+@cache
+def _functions() -> tuple[Any, Any, Any]:
+    library = core_library()
+    run, memory, instructions = (
+        getattr(library, name)
+        for name in ("vi_door_lanes", "vi_door_lanes_memory", "vi_door_lanes_instructions")
+    )
+    run.argtypes = [POINTER(LanesPlan), POINTER(LanesPoints), c_void_p]
+    memory.argtypes, memory.restype = [POINTER(LanesPlan)], c_size_t
+    instructions.argtypes = [ctypes.c_int]
+    return run, memory, instructions
+
+
+def instructions() -> Instructions:
+    """Return the instruction set that lanes run with: the best of this machine, or `$VIBROIMPACT_INSTRUCTIONS`.
+
+    Raises
+    ------
+    UsageError
+        The variable names none, or one that this machine does not have.
+    """
+    chosen = os.environ.get(CHOICE) or "best"
+    wanted = Instructions.__members__.get(chosen)
+    found = 0 if wanted is None else _functions()[2](wanted)
+    if not found:
+        has = [name for name, each in Instructions.__members__.items() if each and _functions()[2](each)]
+        raise UsageError(f"{CHOICE}: expected one that this machine has ({', '.join(has)}), got {chosen!r}.")
+    return Instructions(found)
+
+
+def lanes_memory(plan: LanesPlan) -> NDArray[np.uint8]:
+    """Return memory for what is under way between two calls, for points that have not begun.
+
+    Raises
+    ------
+    UsageError
+        The plan has too many modes or contacts, or an instruction set that this machine does not have.
+    """
+    size = _functions()[1](plan)
+    if size == 0:
+        raise UsageError(
+            f"lanes: expected 1 to {MOST_MODES} modes, 0 to {MOST_CONTACTS} contacts and instructions that this "
+            f"machine has, got {plan.modes}, {plan.contacts} and {plan.instructions}."
+        )
+    return np.zeros(size, dtype=np.uint8)
+
+
+def run_lanes(plan: LanesPlan, points: LanesPoints, memory: NDArray[np.uint8]) -> LanesEnd:
+    """Run what is left of the points, without Python in between; other threads go on meanwhile.
+
+    Parameters
+    ----------
+    plan : LanesPlan
+    points : LanesPoints
+        They are filled as far as the runs came.
+    memory : ndarray of uint8
+        Of `lanes_memory`: with these points, from their first call to their last.
+
+    Returns
+    -------
+    LanesEnd
+        `listen`: it has taken `most_seconds`; `full`: there is no room for more rows; `left`: what has not run is left
+        for the scalar engine, or waits for such a point of its branch. After each of them another call goes on.
+    """
+    return LanesEnd(_functions()[0](plan, points, memory.ctypes.data))

@@ -1,0 +1,53 @@
+#include "lanes/instructions.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#if defined(__x86_64__)
+static bool has(int wanted)
+{
+    __builtin_cpu_init();
+    return wanted == VI_INSTRUCTIONS_AVX512 ? __builtin_cpu_supports("avx512f") != 0
+                                            : wanted != VI_INSTRUCTIONS_AVX2 || __builtin_cpu_supports("avx2") != 0;
+}
+
+static vi_lanes_rounds compiled(int wanted)
+{
+    return wanted == VI_INSTRUCTIONS_AVX512 ? vi_lanes_rounds_avx512
+           : wanted == VI_INSTRUCTIONS_AVX2 ? vi_lanes_rounds_avx2
+                                            : vi_lanes_rounds_baseline;
+}
+#else
+/* The baseline of other machines is all that they have (NEON on arm64). */
+static bool has(int wanted)
+{
+    return wanted == VI_INSTRUCTIONS_BASELINE;
+}
+
+static vi_lanes_rounds compiled(int wanted)
+{
+    (void)wanted;
+    return vi_lanes_rounds_baseline;
+}
+#endif
+
+int vi_lanes_instructions(int wanted)
+{
+    if (wanted < VI_INSTRUCTIONS_BEST || wanted > VI_INSTRUCTIONS_AVX512) {
+        return 0;
+    }
+    if (wanted != VI_INSTRUCTIONS_BEST) {
+        return has(wanted) ? wanted : 0;
+    }
+    int best = VI_INSTRUCTIONS_AVX512;
+    while (!has(best)) {
+        best -= 1;
+    }
+    return best;
+}
+
+vi_lanes_rounds vi_lanes_rounds_of(int wanted)
+{
+    const int found = vi_lanes_instructions(wanted);
+    return found == 0 ? NULL : compiled(found);
+}

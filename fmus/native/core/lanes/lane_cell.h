@@ -1,0 +1,25 @@
+/* The motion of one point over one cell, as a polynomial: what lockstep leaves undecided in it, and its crests. */
+#ifndef VIBROIMPACT_LANE_CELL_H
+#define VIBROIMPACT_LANE_CELL_H
+
+#include "lanes/lane_group.h"
+
+/* Taylor terms of a displacement in the share of the cell. */
+typedef struct {
+    double term[VI_LANE_ORDER + 1];
+} vi_lane_cell;
+
+/* What a careful search comes to. */
+typedef enum { VI_CELL_CLEAR, VI_CELL_HIT, VI_CELL_UNDECIDED } vi_cell_result;
+
+/* Displacement and its slope over the share, after a share of the cell. */
+void vi_lane_cell_at(const vi_lane_cell *cell, double share, double *displacement, double *slope);
+
+/* First zero of a displacement that rises from below, up to *share, certified; a hit tells where it is and the slope there.
+ * scale: size of the numbers that it is the sum of. */
+vi_cell_result vi_lane_cell_search(const vi_lane_cell *cell, double scale, double *share, double *slope);
+
+/* Largest sign * displacement strictly inside the cell up to the share `end`; -HUGE_VAL when it is at an end. */
+double vi_lane_cell_crest(const vi_lane_cell *cell, double sign, double end);
+
+#endif

@@ -1,0 +1,382 @@
+#include "lanes/lane_run.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "body/record.h"
+#include "contact/contact_law.h"
+#include "door/runs.h"
+#include "motion/majorant.h"
+
+/* Least and, its reciprocal, largest size of stiffnesses and decays: squares of rates and of cells stay in range. */
+static const double LEAST = 1e-60;
+
+/* ---- the present instant ---- */
+
+static vi_instant instant_of(const vi_lane_group *g, int lane)
+{
+    return (vi_instant){(int64_t)g->periods[lane], g->rest[lane], g->rest_low[lane]};
+}
+
+static void put_instant(vi_lane_group *g, int lane, vi_instant now)
+{
+    g->periods[lane] = (double)now.periods;
+    g->rest[lane] = now.rest;
+    g->rest_low[lane] = now.rest_low;
+}
+
+static double time_of(const vi_lanes_work *w, int lane)
+{
+    return vi_clock_time(&w->run[lane].clock, instant_of(w->group, lane));
+}
+
+/* ---- the rows ---- */
+
+static void append(const vi_lanes_work *w, int lane, const double row[VI_RECORD_WIDTH])
+{
+    vi_lanes_points *p = w->points;
+    memcpy(p->rows + p->rows_used * VI_RECORD_WIDTH, row, VI_RECORD_WIDTH * sizeof row[0]);
+    p->owner[p->rows_used] = w->run[lane].point;
+    p->rows_of[w->run[lane].point] += 1;
+    p->rows_used += 1;
+}
+
+static void tell_impact(const vi_lanes_work *w, int lane)
+{
+    const vi_lane_group *g = w->group;
+    const vi_lane_run *run = &w->run[lane];
+    const int contact = (int)g->hit[lane] - 1;
+    const double speed = g->approach[lane] * run->unit[contact];
+    const vi_contact_law law = {.restitution = g->restitution[contact][lane],
+                                .yield_velocity = g->yield_velocity[contact][lane] * run->unit[contact]};
+    const double restitution = vi_contact_law_restitution(&law, speed);
+    const double impulse = (1.0 + restitution) * speed * run->impulse[contact];
+    const double row[] = {VI_ROW_IMPACT, time_of(w, lane), vi_clock_phase(&run->clock, instant_of(g, lane)), speed,
+                          impulse, contact + 1.0, restitution, 0.0};
+    append(w, lane, row);
+}
+
+/* A period begins: tell of the one that ends. */
+static void turn_period(const vi_lanes_work *w, int lane, double displacement, double velocity)
+{
+    const vi_lane_group *g = w->group;
+    vi_lane_run *run = &w->run[lane];
+    if (run->period_open) {
+        const bool extrema = w->plan->extrema != 0;
+        const double row[] = {VI_ROW_PERIOD, run->period_start, extrema ? run->highest : NAN,
+                              extrema ? run->lowest : NAN, run->strobe_displacement, run->strobe_velocity,
+                              g->impacts[lane] - run->impacts_before, 0.0};
+        append(w, lane, row);
+    }
+    run->period_open = true;
+    run->period_start = time_of(w, lane);
+    run->strobe_displacement = run->highest = run->lowest = displacement;
+    run->strobe_velocity = velocity;
+    run->impacts_before = g->impacts[lane];
+}
+
+/* ---- the goals of a run ---- */
+
+/* What it flies to next: the end of a recorded period, or of a part of the run. */
+static void set_goal(const vi_lanes_work *w, int lane)
+{
+    vi_lane_group *g = w->group;
+    vi_lane_run *run = &w->run[lane];
+    const vi_instant now = instant_of(g, lane);
+    vi_instant goal = run->recording ? run->end : run->begin;
+    run->goal_is_period = run->recording && w->plan->periods
+                          && vi_clock_to_period_end(&run->clock, now) <= vi_clock_elapsed(&run->clock, now, goal);
+    if (run->goal_is_period) {
+        goal = (vi_instant){now.periods + 1, 0.0, 0.0};
+    }
+    g->goal_periods[lane] = (double)goal.periods;
+    g->goal_rest[lane] = goal.rest;
+    g->goal_rest_low[lane] = goal.rest_low;
+}
+
+static void leave(vi_lanes_work *w, int lane)
+{
+    const int64_t point = w->run[lane].point;
+    w->points->state[point] = VI_POINT_IS_LEFT;
+    w->points->rows_of[point] = 0;
+    w->points->finished += 1;
+    w->run[lane].point = -1;
+}
+
+/* The run has ended. */
+static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
+{
+    vi_lanes_points *points = w->points;
+    const int64_t point = w->run[lane].point;
+    double q[VI_LANES_MODES], p[VI_LANES_MODES], displacement, velocity;
+    w->body->observe(w->group, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
+    w->body->state(w->group, lane, w->plan->modes, q, p);
+    if (!isfinite(displacement) || !isfinite(velocity)) {
+        leave(w, lane);
+        return;
+    }
+    points->outcome[point] = (int8_t)outcome;
+    points->reached[point] = reached;
+    points->displacement[point] = displacement;
+    points->velocity[point] = velocity;
+    for (int j = 0; j < w->plan->modes; ++j) {
+        points->final_q[j * points->count + point] = q[j];
+        points->final_p[j * points->count + point] = p[j];
+    }
+    points->state[point] = VI_POINT_HAS_RUN;
+    points->finished += 1;
+    w->run[lane].point = -1;
+    w->run[lane].following = point + 1;
+}
+
+/* At an instant that is no contact's: begin to record, turn the period, end. */
+static void arrive(vi_lanes_work *w, int lane)
+{
+    vi_lane_group *g = w->group;
+    vi_lane_run *run = &w->run[lane];
+    double displacement, velocity;
+    w->body->observe(g, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
+    if (run->goal_is_period) {
+        turn_period(w, lane, displacement, velocity);
+    }
+    if (!run->recording) {
+        run->recording = true;
+        g->tells[lane] = w->plan->impacts ? 1.0 : 0.0;
+        g->follows[lane] = w->plan->periods && w->plan->extrema ? 1.0 : 0.0;
+        run->highest = run->lowest = displacement;
+        if (w->plan->periods && g->rest[lane] == 0.0) {
+            turn_period(w, lane, displacement, velocity);
+        }
+    }
+    if (vi_clock_elapsed(&run->clock, instant_of(g, lane), run->end) > 0.0) {
+        set_goal(w, lane);
+    } else {
+        finish(w, lane, VI_RUN_ENDED, w->points->end[run->point]);
+    }
+}
+
+/* An impact that is told: its row, and the limit. */
+static void hit(vi_lanes_work *w, int lane)
+{
+    vi_lane_group *g = w->group;
+    if (w->run[lane].recording && w->plan->impacts) {
+        tell_impact(w, lane);
+    }
+    const bool over = vi_clock_elapsed(&w->run[lane].clock, instant_of(g, lane), w->run[lane].end) > 0.0;
+    if (over && g->impacts[lane] >= g->most_impacts[lane]) {
+        finish(w, lane, VI_RUN_IMPACT_LIMIT, time_of(w, lane));
+    }
+}
+
+/* ---- the careful search ---- */
+
+/* The rebound, as in lockstep. Returns the event. */
+static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
+{
+    vi_lane_group *g = w->group;
+    const int c = met->contact;
+    const vi_contact_law law = {.restitution = g->restitution[c][lane], .yield_velocity = g->yield_velocity[c][lane]};
+    const double after = vi_contact_law_restitution(&law, met->approach) * met->approach;
+    g->fastest_impact[lane] = vi_max(g->fastest_impact[lane], met->approach);
+    if (!w->body->rebound(g, lane, w->plan->modes, met, after) || !(after > VI_LANE_TAIL * g->fastest_impact[lane])) {
+        return VI_EVENT_LEAVE;
+    }
+    g->on[lane] = g->hit[lane] = c + 1.0;
+    g->approach[lane] = met->approach;
+    g->impacts[lane] += 1.0;
+    const bool tells = g->tells[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
+    return tells ? VI_EVENT_IMPACT : VI_EVENT_NONE;
+}
+
+/* Search the cell that lockstep could not decide. Returns the event that it comes to. */
+static int search(const vi_lanes_work *w, int lane)
+{
+    vi_lane_group *g = w->group;
+    const vi_clock *clock = &w->run[lane].clock;
+    const vi_instant now = instant_of(g, lane);
+    const vi_instant goal = {(int64_t)g->goal_periods[lane], g->goal_rest[lane], g->goal_rest_low[lane]};
+    const double length = vi_clock_elapsed(clock, now, goal) * g->cell_rate[lane];
+    double share = vi_max(0.0, vi_min(length, 1.0));
+    vi_lane_meeting met;
+    const vi_cell_result result = w->body->search(g, lane, w->plan->modes, w->plan->contacts, &share, &met);
+    if (result == VI_CELL_UNDECIDED) {
+        return VI_EVENT_LEAVE;
+    }
+    g->on[lane] = 0.0;
+    if (result == VI_CELL_CLEAR && length <= 1.0) {
+        put_instant(g, lane, goal);
+        return VI_EVENT_GOAL;
+    }
+    put_instant(g, lane, vi_clock_after(clock, now, share * g->cell[lane]));
+    return result == VI_CELL_HIT ? bounce(w, lane, &met) : VI_EVENT_NONE;
+}
+
+static void follow_extremes(const vi_lanes_work *w, int lane)
+{
+    if (w->group->follows[lane] > 0.0) {
+        w->body->extremes(w->group, lane, w->plan->modes, w->plan->contacts, &w->run[lane].highest, &w->run[lane].lowest);
+    }
+}
+
+void vi_lane_attend(vi_lanes_work *w, int lane)
+{
+    int event = (int)w->group->event[lane];
+    if (event == VI_EVENT_NONE) {
+        return;
+    }
+    follow_extremes(w, lane);
+    if (event == VI_EVENT_CELL) {
+        event = search(w, lane);
+        if (event != VI_EVENT_LEAVE) {
+            follow_extremes(w, lane);
+        }
+    }
+    if (event == VI_EVENT_LEAVE) {
+        leave(w, lane);
+    } else if (event == VI_EVENT_GOAL) {
+        arrive(w, lane);
+    } else if (event == VI_EVENT_IMPACT) {
+        hit(w, lane);
+    }
+}
+
+/* ---- the start ---- */
+
+void vi_lane_idle(vi_lanes_work *w, int lane)
+{
+    double *all = (double *)w->group; /* arrays over the lanes, all of them */
+    for (size_t i = (size_t)lane; i < sizeof *w->group / sizeof *all; i += VI_LANES) {
+        all[i] = 0.0;
+    }
+    vi_lane_group *g = w->group;
+    w->run[lane].point = -1;
+    g->cell_rate[lane] = g->period[lane] = g->many.rate[0][lane] = 1.0;
+    g->goal_periods[lane] = 1e300;
+    g->most_impacts[lane] = HUGE_VAL;
+    for (int c = 0; c < VI_LANES_CONTACTS; ++c) {
+        g->limit[c][lane] = 1.0;
+        g->many.offset[c][lane] = -1.0;
+    }
+}
+
+/* Its clock and the window of its recording; false where they are none. */
+static bool take_time(const vi_lanes_work *w, int lane, int64_t point)
+{
+    const vi_lanes_points *p = w->points;
+    vi_lane_run *run = &w->run[lane];
+    const double frequency = p->angular_frequency[point], phase = p->phase[point];
+    vi_instant start;
+    if (!(frequency >= 0.0) || !isfinite(frequency) || !isfinite(phase) || !(p->begin[point] >= 0.0)
+        || !(p->end[point] >= p->begin[point]) || !isfinite(p->end[point])
+        || !vi_clock_start(&run->clock, frequency, phase, sqrt(p->stiffness[point]))
+        || !vi_clock_instant(&run->clock, 0.0, 0.0, &start)
+        || !vi_clock_instant(&run->clock, p->begin[point], 0.0, &run->begin)
+        || !vi_clock_instant(&run->clock, p->end[point], 0.0, &run->end)) {
+        return false;
+    }
+    put_instant(w->group, lane, start);
+    w->group->angular_frequency[lane] = frequency;
+    w->group->period[lane] = run->clock.period;
+    w->group->period_low[lane] = run->clock.period_low;
+    return true;
+}
+
+/* Springs and dashpots that a lane can follow. */
+static bool take_modes(const vi_lanes_work *w, int64_t point)
+{
+    const vi_lanes_points *p = w->points;
+    for (int j = 0; j < w->plan->modes; ++j) {
+        const int64_t i = j * p->count + point;
+        if (!(p->stiffness[i] > LEAST) || !(p->stiffness[i] < 1.0 / LEAST) || !(p->decay[i] >= 0.0)
+            || !(p->decay[i] < 1.0 / LEAST) || !isfinite(p->observed[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Where a point starts: its own start, or where the last one before it on its branch that came to its end has ended. */
+static bool take_start(const vi_lanes_work *w, int64_t point, double q[], double p[])
+{
+    const vi_lanes_points *points = w->points;
+    const bool own = point == 0 || points->first[point];
+    int64_t from = own ? point : point - 1;
+    while (!own && from > 0 && !points->first[from] && points->outcome[from] != VI_RUN_ENDED) {
+        from -= 1;
+    }
+    bool good = own || points->outcome[from] == VI_RUN_ENDED;
+    for (int j = 0; j < w->plan->modes; ++j) {
+        const int64_t i = j * points->count + from;
+        q[j] = own ? points->start_q[i] : points->final_q[i];
+        p[j] = own ? points->start_p[i] : points->final_p[i];
+        good = good && isfinite(q[j]) && isfinite(p[j]);
+    }
+    return good;
+}
+
+/* How its contacts are told of. */
+static void take_units(const vi_lanes_work *w, int lane, int64_t point)
+{
+    const vi_lanes_points *p = w->points;
+    vi_lane_run *run = &w->run[lane];
+    for (int c = 0; c < w->plan->contacts; ++c) {
+        double mobility = 0.0;
+        for (int j = 0; j < w->plan->modes; ++j) {
+            const int64_t i = (c * w->plan->modes + j) * p->count + point;
+            mobility += p->shape[i] * p->impulse[i];
+        }
+        run->impulse[c] = 1.0 / mobility;
+        run->unit[c] = w->plan->modes == 1 ? fabs(p->shape[c * p->count + point]) : 1.0;
+    }
+}
+
+/* Begin a point in a lane; one may be left, or end, at once. */
+static void begin_point(vi_lanes_work *w, int lane, int64_t point)
+{
+    vi_lane_group *g = w->group;
+    vi_lane_run *run = &w->run[lane];
+    double q[VI_LANES_MODES], p[VI_LANES_MODES];
+    run->point = point;
+    run->recording = run->goal_is_period = run->period_open = false;
+    w->points->rows_of[point] = 0;
+    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = g->tells[lane] = g->follows[lane] = 0.0;
+    g->most_impacts[lane] = w->plan->impact_limit > 0 ? (double)w->plan->impact_limit : HUGE_VAL;
+    if (!take_start(w, point, q, p) || !take_modes(w, point) || !take_time(w, lane, point)
+        || !w->body->take(g, lane, w->plan, w->points, point, q, p)) {
+        leave(w, lane);
+        return;
+    }
+    take_units(w, lane, point);
+    w->points->state[point] = VI_POINT_RUNS;
+    if (vi_clock_elapsed(&run->clock, instant_of(g, lane), run->begin) > 0.0) {
+        set_goal(w, lane);
+    } else {
+        arrive(w, lane);
+    }
+}
+
+static bool can_begin(const vi_lanes_points *p, int64_t point)
+{
+    if (point >= p->count || p->state[point] != VI_POINT_WAITS) {
+        return false;
+    }
+    const uint8_t before = point == 0 || p->first[point] ? VI_POINT_HAS_RUN : p->state[point - 1];
+    return before == VI_POINT_HAS_RUN || before == VI_POINT_IS_ANSWERED;
+}
+
+bool vi_lane_take(vi_lanes_work *w, int lane)
+{
+    const int64_t following = w->run[lane].following;
+    if (can_begin(w->points, following)) { /* of the branch that the lane is on */
+        begin_point(w, lane, following);
+        return true;
+    }
+    for (; w->next < w->points->count; ++w->next) {
+        if (can_begin(w->points, w->next)) {
+            begin_point(w, lane, w->next);
+            return true;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,15 @@
+/* Tables of a lane's motion: Taylor terms over a cell, and the states after whole cells. */
+#ifndef VIBROIMPACT_LANE_TABLES_H
+#define VIBROIMPACT_LANE_TABLES_H
+
+#include "lanes/lane_group.h"
+
+/* A mode and its loads, per unit modal mass: see lanes.h. */
+typedef struct {
+    double stiffness, decay, force, held, angular_frequency;
+} vi_lane_mode;
+
+/* Fill the tables of one lane for cells of this length, s, which must be short against every rate. */
+void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, double cell);
+
+#endif

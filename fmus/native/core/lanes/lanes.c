@@ -1,0 +1,115 @@
+#include "lanes/lanes.h"
+
+#include <string.h>
+
+#include "door/seconds.h"
+#include "lanes/instructions.h"
+#include "lanes/lane_run.h"
+
+/* Rounds of attending the lanes between two looks at the clock. */
+enum { ROUNDS_UNHEARD = 64 };
+/* Rows that one attending of the lanes may write. */
+enum { MOST_ROWS = 8 * VI_LANES };
+
+/* What is under way between two calls. */
+typedef struct {
+    vi_lane_group group; /* first: aligned as vectors are */
+    vi_lane_run run[VI_LANES];
+    int64_t begun;
+} under_way;
+
+enum { ALIGNMENT = 64 };
+
+static under_way *aligned(void *memory)
+{
+    const uintptr_t place = ((uintptr_t)memory + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    return (under_way *)place;
+}
+
+static bool is_plan(const vi_lanes_plan *plan)
+{
+    return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= VI_LANES_CONTACTS
+           && vi_lanes_rounds_of(plan->instructions) != NULL;
+}
+
+VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan)
+{
+    return is_plan(plan) ? sizeof(under_way) + ALIGNMENT : 0;
+}
+
+VI_DOOR int vi_door_lanes_instructions(int wanted)
+{
+    return vi_lanes_instructions(wanted);
+}
+
+static bool works(const vi_lanes_work *work)
+{
+    bool found = false;
+    for (int lane = 0; lane < VI_LANES; ++lane) {
+        found = found || work->run[lane].point >= 0;
+    }
+    return found;
+}
+
+/* Lanes without a point take what can begin. */
+static void take_all(vi_lanes_work *work)
+{
+    for (int lane = 0; lane < VI_LANES; ++lane) {
+        bool takes = work->run[lane].point < 0;
+        while (takes && work->run[lane].point < 0) {
+            takes = vi_lane_take(work, lane);
+        }
+        if (work->run[lane].point < 0) {
+            vi_lane_idle(work, lane);
+        }
+    }
+}
+
+static void begin(vi_lanes_work *work, under_way *memory)
+{
+    if (memory->begun) {
+        return;
+    }
+    memset(memory, 0, sizeof *memory);
+    memory->begun = 1;
+    for (int lane = 0; lane < VI_LANES; ++lane) {
+        vi_lane_idle(work, lane);
+    }
+}
+
+VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, void *memory)
+{
+    if (!is_plan(plan) || points->rows_room < VI_LANES_LEAST_ROOM) {
+        return VI_LANES_REFUSED;
+    }
+    const double call = vi_seconds_now();
+    const vi_lanes_rounds rounds = vi_lanes_rounds_of(plan->instructions);
+    under_way *now = aligned(memory);
+    vi_lanes_work work = {plan, plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes, points, &now->group, now->run, 0};
+    begin(&work, now);
+    for (int unheard = 0;; ++unheard) {
+        if (points->rows_room - points->rows_used < MOST_ROWS) {
+            return VI_LANES_FULL;
+        }
+        if (unheard == ROUNDS_UNHEARD) {
+            unheard = 0;
+            if (vi_seconds_since(call) >= points->most_seconds) {
+                return VI_LANES_LISTEN;
+            }
+        }
+        take_all(&work);
+        if (!works(&work)) {
+            break;
+        }
+        rounds(&now->group, plan->modes, plan->contacts);
+        for (int lane = 0; lane < VI_LANES; ++lane) {
+            vi_lane_attend(&work, lane);
+        }
+    }
+    for (int64_t i = 0; i < points->count; ++i) {
+        if (points->state[i] != VI_POINT_HAS_RUN && points->state[i] != VI_POINT_IS_ANSWERED) {
+            return VI_LANES_LEFT;
+        }
+    }
+    return VI_LANES_DONE;
+}

@@ -1,0 +1,242 @@
+/* A body of one mode: its tables, and the motion of one lane of it. */
+#include <float.h>
+#include <math.h>
+
+#include "body/landing.h"
+#include "lanes/lane_body.h"
+#include "lanes/lane_tables.h"
+#include "lanes/lane_turn.h"
+#include "motion/majorant.h"
+
+/* The steady response counts in the resolution up to this multiple of what the force does within one radian. */
+static const double LARGEST_STEADY = 8.0;
+
+/* ---- where it is ---- */
+
+/* A row of a table for the state at the start of the last round. */
+static double after_cells(const vi_lane_array row[VI_PARTS], const vi_lane_group *g, int lane)
+{
+    return (row[VI_OF_Q][lane] * g->start_q[0][lane] + row[VI_OF_P][lane] * g->start_p[0][lane])
+           + ((row[VI_OF_COSINE][lane] * g->start_cosine[lane] + row[VI_OF_SINE][lane] * g->start_sine[lane])
+              + row[VI_OF_ONE][lane]);
+}
+
+/* The motion of q over the cell `passed` cells after the start of the last round. */
+static vi_lane_cell cell_after(const vi_lane_group *g, int lane, int passed)
+{
+    const vi_one_mode *one = &g->one;
+    const double q = after_cells(one->end_q[passed], g, lane), p = after_cells(one->end_p[passed], g, lane);
+    const double turn = one->turn_cosine[passed][lane], turn_sine = one->turn_sine[passed][lane];
+    const double cosine = g->start_cosine[lane] * turn - g->start_sine[lane] * turn_sine;
+    const double sine = g->start_sine[lane] * turn + g->start_cosine[lane] * turn_sine;
+    vi_lane_cell cell = {{q, p * g->cell[lane]}};
+    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
+        const vi_lane_array *row = one->taylor[n];
+        cell.term[n] = (row[VI_OF_Q][lane] * q + row[VI_OF_P][lane] * p)
+                       + ((row[VI_OF_COSINE][lane] * cosine + row[VI_OF_SINE][lane] * sine) + row[VI_OF_ONE][lane]);
+    }
+    return cell;
+}
+
+/* ---- the careful search ---- */
+
+/* The motion towards stop c. */
+static vi_lane_cell towards(const vi_lane_group *g, int lane, int c, const vi_lane_cell *cell)
+{
+    vi_lane_cell motion;
+    for (int n = 0; n <= VI_LANE_ORDER; ++n) {
+        motion.term[n] = g->sign[c][lane] * cell->term[n];
+    }
+    motion.term[0] = g->on[lane] == c + 1 ? 0.0 : motion.term[0] - g->limit[c][lane];
+    return motion;
+}
+
+static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts, double *share, vi_lane_meeting *met)
+{
+    (void)modes;
+    g->start_q[0][lane] = g->q[0][lane];
+    g->start_p[0][lane] = g->p[0][lane];
+    vi_lane_turn(g->angular_frequency[lane] * g->rest[lane], &g->start_cosine[lane], &g->start_sine[lane]);
+    g->passed[lane] = 0.0;
+    const vi_lane_cell cell = cell_after(g, lane, 0);
+    vi_cell_result result = VI_CELL_CLEAR;
+    double slope;
+    for (int c = 0; c < contacts; ++c) {
+        const vi_lane_cell motion = towards(g, lane, c, &cell);
+        const double scale = fabs(g->limit[c][lane]) + fabs(cell.term[0]) + fabs(cell.term[1]);
+        const vi_cell_result one = vi_lane_cell_search(&motion, scale, share, &slope);
+        if (one == VI_CELL_UNDECIDED) {
+            return one;
+        }
+        if (one == VI_CELL_HIT) {
+            *met = (vi_lane_meeting){c, slope * g->cell_rate[lane]};
+            result = one;
+        }
+    }
+    vi_lane_cell_at(&cell, *share, &g->q[0][lane], &slope);
+    g->p[0][lane] = slope * g->cell_rate[lane];
+    g->share[lane] = *share;
+    return result;
+}
+
+static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting *met, double after)
+{
+    (void)modes;
+    const double sign = g->sign[met->contact][lane];
+    g->q[0][lane] = sign * g->limit[met->contact][lane];
+    g->p[0][lane] = -sign * after;
+    return met->approach * met->approach > g->resolution[met->contact][lane];
+}
+
+/* ---- extremes ---- */
+
+/* How far q may be from a line over one of the cells to come, and p from one: as the rounds bound them. */
+typedef struct {
+    double q, p;
+} bulges;
+
+static bulges bulges_of(const vi_lane_group *g, int lane)
+{
+    const vi_one_mode *one = &g->one;
+    const double q = g->start_q[0][lane], p = g->start_p[0][lane], k = one->stiffness[lane], load = one->load[lane];
+    const double norm = sqrt(p * p + k * (q * q)) + load * one->span[lane];
+    const double second = load + one->root_rate[lane] * norm;
+    const double third = g->angular_frequency[lane] * load + (one->drag[lane] * second + k * norm);
+    const double eighth = 0.125 * g->cell[lane] * g->cell[lane];
+    return (bulges){second * eighth, third * eighth};
+}
+
+/* Does q rise, or fall, all through the cell after `passed`? */
+static bool is_monotone(const vi_lane_group *g, int lane, int passed, double bulge)
+{
+    const double first = after_cells(g->one.end_p[passed], g, lane);
+    const double last = after_cells(g->one.end_p[passed + 1], g, lane);
+    return vi_min(first, last) > bulge || vi_max(first, last) < -bulge;
+}
+
+/* How far the stops let q go on this side. */
+static double stop_on(const vi_lane_group *g, int lane, int contacts, double sign)
+{
+    double farthest = HUGE_VAL;
+    for (int c = 0; c < contacts; ++c) {
+        if (g->sign[c][lane] == sign) {
+            farthest = vi_min(farthest, g->limit[c][lane]);
+        }
+    }
+    return farthest;
+}
+
+/* The largest sign * q, so far `most`, over the round whose cells end at edge[]. */
+static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[],
+                     const bulges *bulge, double most)
+{
+    const int passed = (int)g->passed[lane], last = g->share[lane] > 0.0 ? passed + 1 : passed;
+    const double stop = stop_on(g, lane, contacts, sign);
+    for (int i = 0; i <= last; ++i) {
+        most = vi_max(most, vi_min(stop, sign * edge[i]));
+    }
+    for (int i = 0; i < last && most < stop; ++i) {
+        if (vi_max(sign * edge[i], sign * edge[i + 1]) + bulge->q > most
+            && !(i < passed && is_monotone(g, lane, i, bulge->p))) {
+            const vi_lane_cell cell = cell_after(g, lane, i);
+            const double inside = vi_lane_cell_crest(&cell, sign, i < passed ? 1.0 : g->share[lane]);
+            most = vi_max(most, vi_min(stop, inside));
+        }
+    }
+    return most;
+}
+
+static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, double *highest, double *lowest)
+{
+    (void)modes;
+    const double observed = g->one.observed[lane];
+    const bulges bulge = bulges_of(g, lane);
+    const int passed = (int)g->passed[lane];
+    double edge[VI_CELLS + 2];
+    if (observed == 0.0) {
+        return;
+    }
+    edge[0] = g->start_q[0][lane];
+    for (int i = 1; i <= passed; ++i) {
+        edge[i] = after_cells(g->one.end_q[i], g, lane);
+    }
+    edge[passed + 1] = g->q[0][lane];
+    const double above = observed > 0.0 ? *highest : *lowest, below = observed > 0.0 ? *lowest : *highest;
+    const double most = observed * extend(g, lane, contacts, 1.0, edge, &bulge, above / observed);
+    const double least = -observed * extend(g, lane, contacts, -1.0, edge, &bulge, -below / observed);
+    *highest = vi_max(*highest, vi_max(most, least));
+    *lowest = vi_min(*lowest, vi_min(most, least));
+}
+
+static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)
+{
+    (void)modes;
+    for (int c = 0; c < contacts; ++c) {
+        if (g->sign[c][lane] * g->q[0][lane] > g->limit[c][lane]) {
+            g->q[0][lane] = g->sign[c][lane] * g->limit[c][lane];
+        }
+    }
+    *displacement = g->one.observed[lane] * g->q[0][lane];
+    *velocity = g->one.observed[lane] * g->p[0][lane];
+}
+
+static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
+{
+    (void)modes;
+    q[0] = g->q[0][lane];
+    p[0] = g->p[0][lane];
+}
+
+/* ---- the start ---- */
+
+/* The contacts of a point; false where one is none, or the start is not free of it. */
+static bool take_contacts(vi_lane_group *g, int lane, int contacts, const vi_lanes_points *p, int64_t point, double size)
+{
+    double room = 0.0;
+    for (int c = 0; c < contacts; ++c) {
+        const int64_t i = c * p->count + point;
+        const double unit = fabs(p->shape[i]), sign = p->shape[i] * p->direction[i] > 0.0 ? 1.0 : -1.0;
+        const double limit = p->direction[i] * p->position[i] / unit, q = g->q[0][lane];
+        const double pressure = g->one.load[lane] + g->one.stiffness[lane] * fabs(limit);
+        const bool is_free = limit - sign * q > VI_ROUNDING * (fabs(limit) + fabs(q));
+        if (!vi_lane_is_contact(p, i) || !(p->shape[i] * p->impulse[i] > 0.0) || !isfinite(limit) || !is_free) {
+            return false;
+        }
+        room += c == 0 || sign != g->sign[0][lane] ? limit : HUGE_VAL;
+        g->sign[c][lane] = sign;
+        g->limit[c][lane] = limit;
+        g->restitution[c][lane] = p->restitution[i];
+        g->yield_velocity[c][lane] = p->yield_velocity[i] / unit;
+        g->resolution[c][lane] = 2.0 * pressure * DBL_EPSILON * (fabs(limit) + size);
+    }
+    return contacts < 2 || room > 0.0;
+}
+
+static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points, int64_t point,
+                 const double q[], const double p[])
+{
+    vi_one_mode *one = &g->one;
+    const vi_lane_mode mode = {points->stiffness[point], points->decay[point], points->force[point],
+                               points->held[point], points->angular_frequency[point]};
+    const double natural = sqrt(mode.stiffness), drag = 2.0 * mode.decay;
+    const double fastest = vi_max(vi_max(natural, drag), mode.angular_frequency), period = g->period[lane];
+    const double cell = vi_lane_cell_length(vi_min(VI_CELL_REACH / fastest, VI_LONGEST_CELL * period));
+    if (!isfinite(mode.force) || !isfinite(mode.held) || !(cell > 0.0) || !(period <= VI_MOST_CELLS * cell)) {
+        return false;
+    }
+    vi_lane_tables(g, lane, &mode, cell);
+    g->cell[lane] = cell;
+    g->cell_rate[lane] = 1.0 / cell;
+    g->q[0][lane] = q[0];
+    g->p[0][lane] = p[0];
+    one->span[lane] = (double)VI_CELLS * cell;
+    one->stiffness[lane] = mode.stiffness;
+    one->load[lane] = fabs(mode.force) + fabs(mode.held);
+    one->drag[lane] = drag;
+    one->root_rate[lane] = drag + natural;
+    one->observed[lane] = points->observed[point];
+    const double steady = LARGEST_STEADY * one->load[lane] / (fastest * fastest);
+    return take_contacts(g, lane, plan->contacts, points, point, steady);
+}
+
+const vi_lane_body vi_lane_one_mode = {take, search, rebound, extremes, observe, state};

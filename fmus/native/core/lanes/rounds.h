@@ -1,0 +1,391 @@
+/* The lockstep of bodies of one mode. Included by one C file for each instruction set, which names VI_ROUNDS. */
+#include "lanes/lane_group.h"
+#include "lanes/vector.h"
+
+/* Rounds after which the caller is heard again. */
+enum { MOST_ROUNDS = 256 };
+/* Times that a lane may come through all its cells in one round. */
+enum { MOST_JUMPS = 3 };
+
+/* Rounding of a displacement, in units of the terms it is the sum of. */
+#define ROUNDING (16.0 * 2.220446049250313e-16)
+
+/* Where the lanes of a vector are at the start of a round. */
+typedef struct {
+    vector q, p, cosine, sine, on;
+    vector to_goal;             /* cells */
+    vector jumped;              /* whole cells that the round has led through before */
+    vector second, third, fourth; /* bounds of derivatives of q until VI_CELLS cells later, over a cell's powers */
+} setting;
+
+/* The cell in which a lane may meet something. */
+typedef struct {
+    vector passed;        /* whole cells before it */
+    vector length;        /* share of it up to the goal or its end */
+    mask goal;            /* its end is the goal */
+    mask searched;        /* a contact may be met in it */
+    mask twofold;         /* two may */
+    vector sign, limit;   /* of the contact */
+    vector number;        /* from 1 */
+    vector q, p, cosine, sine; /* at its start */
+} candidate;
+
+/* Bounds of the derivatives of q until VI_CELLS cells later. */
+LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
+{
+    /* the energy norm grows by no more than the loads do; the derivatives follow from the equation */
+    const vector k = load(g->one.stiffness + at), loads = load(g->one.load + at), drag = load(g->one.drag + at);
+    const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
+    const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * load(g->one.span + at);
+    const vector second = loads + load(g->one.root_rate + at) * norm;
+    const vector third = w * loads + (drag * second + k * norm);
+    const vector fourth = w * (w * loads) + (drag * third + k * second);
+    s->second = second * square;
+    s->third = third * (square * cell);
+    s->fourth = fourth * (square * square);
+}
+
+/* What is left up to the goal, s. */
+LANES_INLINE vector seconds_to_goal(const vi_lane_group *g, int at)
+{
+    const vector whole = load(g->goal_periods + at) - load(g->periods + at);
+    const vector high = whole * load(g->period + at) + (load(g->goal_rest + at) - load(g->rest + at));
+    const vector low = whole * load(g->period_low + at) + (load(g->goal_rest_low + at) - load(g->rest_low + at));
+    return high + low;
+}
+
+LANES_INLINE setting begin_round(const vi_lane_group *g, int at)
+{
+    setting s;
+    s.q = load(g->q[0] + at);
+    s.p = load(g->p[0] + at);
+    s.on = load(g->on + at);
+    turn(load(g->angular_frequency + at) * load(g->rest + at), &s.cosine, &s.sine);
+    s.to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
+    s.jumped = all(0.0);
+    bound(g, at, &s);
+    return s;
+}
+
+/* Count the cells that no contact is met in: each contact's, and of all. */
+LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setting *s, vector count[])
+{
+    vector before[VI_LANES_CONTACTS], sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS];
+    mask clear[VI_LANES_CONTACTS];
+    const vector bulge = 0.125 * s->second;
+    for (int c = 0; c < contacts; ++c) {
+        sign[c] = load(g->sign[c] + at);
+        limit[c] = load(g->limit[c] + at);
+        before[c] = sign[c] * s->q - limit[c];
+        count[c] = all(0.0);
+        clear[c] = before[c] == before[c];
+    }
+#pragma GCC unroll 8
+    for (int i = 1; i <= VI_CELLS; ++i) {
+        const vi_lane_array *table = g->one.end_q[i];
+        const vector q = (load(table[VI_OF_Q] + at) * s->q + load(table[VI_OF_P] + at) * s->p)
+                         + ((load(table[VI_OF_COSINE] + at) * s->cosine + load(table[VI_OF_SINE] + at) * s->sine)
+                            + load(table[VI_OF_ONE] + at));
+        for (int c = 0; c < contacts; ++c) {
+            const vector y = sign[c] * q - limit[c];
+            mask passes = larger(before[c], y) + bulge < 0.0;
+            if (i == 1) {
+                /* just left: the mean velocity since, which is smooth, stays negative */
+                const vector leaving = sign[c] * (s->p * load(g->cell + at));
+                const mask left = larger(leaving, y) + s->third * (1.0 / 24.0) < 0.0;
+                const mask here = s->on == (double)(c + 1);
+                passes = (passes & ~here) | (left & here);
+            }
+            clear[c] &= passes;
+            count[c] += only(clear[c], all(1.0));
+            before[c] = y;
+        }
+    }
+}
+
+/* Rows of a table, each lane's own. */
+LANES_INLINE vector gather(const vi_lane_array *rows, int stride, int at, const int row[])
+{
+    vector found;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        found[i] = rows[row[i] * stride][at + i];
+    }
+    return found;
+}
+
+LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, candidate *cell)
+{
+    int row[VI_WIDTH];
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        row[i] = (int)cell->passed[i];
+    }
+    const vi_lane_array *q = g->one.end_q[0], *p = g->one.end_p[0];
+    cell->q = (gather(q + VI_OF_Q, VI_PARTS, at, row) * s->q + gather(q + VI_OF_P, VI_PARTS, at, row) * s->p)
+              + ((gather(q + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
+                  + gather(q + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
+                 + gather(q + VI_OF_ONE, VI_PARTS, at, row));
+    cell->p = (gather(p + VI_OF_Q, VI_PARTS, at, row) * s->q + gather(p + VI_OF_P, VI_PARTS, at, row) * s->p)
+              + ((gather(p + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
+                  + gather(p + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
+                 + gather(p + VI_OF_ONE, VI_PARTS, at, row));
+    const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
+    cell->cosine = s->cosine * c - s->sine * n;
+    cell->sine = s->sine * c + s->cosine * n;
+}
+
+/* Whole cells that a lane surely comes through: no contact in them, and not beyond the goal. */
+LANES_INLINE vector sure_cells(const setting *s, int contacts, const vector count[], vector *cleared)
+{
+    *cleared = all((double)VI_CELLS);
+    for (int c = 0; c < contacts; ++c) {
+        *cleared = smaller(count[c], *cleared);
+    }
+    return smaller(*cleared, whole_part(smaller(s->to_goal, all((double)VI_CELLS))));
+}
+
+/* Lanes that come through all their cells go on from there in the same round. */
+LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, setting *s)
+{
+    const vi_lane_array *q = g->one.end_q[VI_CELLS], *p = g->one.end_p[VI_CELLS];
+    const vector c = load(g->one.turn_cosine[VI_CELLS] + at), n = load(g->one.turn_sine[VI_CELLS] + at);
+    const vector next_q = (load(q[VI_OF_Q] + at) * s->q + load(q[VI_OF_P] + at) * s->p)
+                          + ((load(q[VI_OF_COSINE] + at) * s->cosine + load(q[VI_OF_SINE] + at) * s->sine)
+                             + load(q[VI_OF_ONE] + at));
+    const vector next_p = (load(p[VI_OF_Q] + at) * s->q + load(p[VI_OF_P] + at) * s->p)
+                          + ((load(p[VI_OF_COSINE] + at) * s->cosine + load(p[VI_OF_SINE] + at) * s->sine)
+                             + load(p[VI_OF_ONE] + at));
+    const vector cosine = s->cosine * c - s->sine * n, sine = s->sine * c + s->cosine * n;
+    s->q = choose(jumps, next_q, s->q);
+    s->p = choose(jumps, next_p, s->p);
+    s->cosine = choose(jumps, cosine, s->cosine);
+    s->sine = choose(jumps, sine, s->sine);
+    s->on = only(~jumps, s->on);
+    s->jumped += only(jumps, all((double)VI_CELLS));
+    s->to_goal -= only(jumps, all((double)VI_CELLS));
+    bound(g, at, s);
+}
+
+LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts, setting *s)
+{
+    candidate cell;
+    vector count[VI_LANES_CONTACTS], cleared;
+    const mask alone = load(g->follows + at) == 0.0;
+    for (int i = 0;; ++i) {
+        scan(g, at, contacts, s, count);
+        cell.passed = sure_cells(s, contacts, count, &cleared);
+        const mask jumps = alone & (cell.passed == (double)VI_CELLS);
+        if (i == MOST_JUMPS || !any(jumps)) {
+            break;
+        }
+        jump(g, at, jumps, s);
+    }
+    const mask jumps = cell.passed == (double)VI_CELLS;
+    const vector length = larger(s->to_goal - cell.passed, all(0.0));
+    cell.length = only(~jumps, smaller(length, all(1.0)));
+    cell.goal = ~jumps & (length <= 1.0);
+    cell.searched = ~jumps & (cleared == cell.passed);
+    cell.twofold = cell.searched & ~cell.searched;
+    cell.sign = cell.limit = cell.number = all(0.0);
+    for (int c = contacts - 1; c >= 0; --c) {
+        const mask met = cell.searched & (count[c] == cell.passed);
+        cell.twofold |= met & (cell.number > 0.0);
+        cell.sign = choose(met, load(g->sign[c] + at), cell.sign);
+        cell.limit = choose(met, load(g->limit[c] + at), cell.limit);
+        cell.number = choose(met, all((double)(c + 1)), cell.number);
+    }
+    go_to_cell(g, at, s, &cell);
+    return cell;
+}
+
+/* Taylor coefficients of q over the cell, in its share. */
+LANES_INLINE void expand(const vi_lane_group *g, int at, const candidate *cell, vector term[])
+{
+    term[0] = cell->q;
+    term[1] = cell->p * load(g->cell + at);
+#pragma GCC unroll 16
+    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
+        const vi_lane_array *table = g->one.taylor[n];
+        term[n] = (load(table[VI_OF_Q] + at) * cell->q + load(table[VI_OF_P] + at) * cell->p)
+                  + ((load(table[VI_OF_COSINE] + at) * cell->cosine + load(table[VI_OF_SINE] + at) * cell->sine)
+                     + load(table[VI_OF_ONE] + at));
+    }
+}
+
+/* What the polynomial adds to its first term, and its slope, after a share of the cell. */
+LANES_INLINE void follow(const vector term[], vector share, vector *added, vector *slope)
+{
+    vector x = term[VI_LANE_ORDER], v = (double)VI_LANE_ORDER * x;
+#pragma GCC unroll 16
+    for (int n = VI_LANE_ORDER - 1; n >= 1; --n) {
+        x = x * share + term[n];
+        v = v * share + (double)n * term[n];
+    }
+    *added = x * share;
+    *slope = v;
+}
+
+/* One step towards the zero of y + sign * (what the polynomial adds), of third order (Chebyshev's). */
+LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
+{
+    vector x = term[VI_LANE_ORDER], v = x * 0.0, a = v;
+#pragma GCC unroll 16
+    for (int n = VI_LANE_ORDER - 1; n >= 1; --n) {
+        a = a * share + v;
+        v = v * share + x;
+        x = x * share + term[n];
+    }
+    /* of the polynomial over its share: what is left is one order lower */
+    const vector slope = v * share + x, bend = a * share + v;
+    const vector step = (y + sign * (x * share)) / (sign * slope);
+    return share - step * (1.0 + step * (bend / slope));
+}
+
+/* Where a rising cubic's inverse has its zero: the first guess of the contact. */
+LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end_slope, vector length)
+{
+    const vector rise = end_y - y, t = -y / rise, back = 1.0 - t;
+    const vector mean = rise / length;
+    const vector x = t + t * back * ((mean / slope - 1.0) * back - (mean / end_slope - 1.0) * t);
+    return length * smaller(larger(x, all(0.0)), all(1.0));
+}
+
+/* What has become of the lanes in a round. */
+typedef struct {
+    vector share; /* of the cell that they have come through */
+    vector q, p;
+    mask hits, careful;
+} arrival;
+
+LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, const candidate *cell)
+{
+    vector term[VI_LANE_ORDER + 1], added, slope;
+    expand(g, at, cell, term);
+    follow(term, cell->length, &added, &slope);
+    const vector length = cell->length, bare = cell->sign * cell->q - cell->limit;
+    const mask leaves = (cell->passed == 0.0) & (s->on == cell->number);
+    const vector y = only(~leaves, bare), first = cell->sign * term[1];
+    const vector end_y = y + cell->sign * added, end_slope = cell->sign * slope;
+    const vector noise = ROUNDING * (size_of(cell->limit) + size_of(cell->q) + size_of(term[1]) + size_of(added));
+    const mask rises = (smaller(first, end_slope) > 0.125 * s->third * (length * length)) & (y <= noise);
+    /* Bernstein's coefficients of the cubic with these values and slopes, and what is not cubic */
+    const vector third = length * (1.0 / 3.0);
+    const vector highest = larger(larger(y, end_y), larger(y + third * first, end_y - third * end_slope));
+    const mask below = highest + s->fourth * (1.0 / 384.0) < 0.0;
+    arrival a;
+    a.hits = cell->searched & ~cell->twofold & rises & (end_y > 0.0);
+    a.careful = cell->searched & ~a.hits & (cell->twofold | ~(below | (rises & (end_y <= 0.0))));
+    a.share = length;
+    if (any(a.hits)) {
+        vector share = first_guess(y, first, end_y, end_slope, length);
+        for (int i = 0; i < 2; ++i) {
+            share = smaller(larger(closer(term, y, cell->sign, share), all(0.0)), length);
+        }
+        a.share = choose(a.hits, share, length);
+        follow(term, a.share, &added, &slope);
+        const mask lost = a.hits & ~(size_of(y + cell->sign * added) <= noise);
+        a.hits &= ~lost;
+        a.careful |= lost;
+    }
+    a.q = choose(a.hits, cell->sign * cell->limit, cell->q + added);
+    a.p = slope * load(g->cell_rate + at);
+    return a;
+}
+
+/* Rebound where contacts are hit; returns the lanes that leave lockstep. */
+LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *cell, arrival *a)
+{
+    const vector approach = cell->sign * a->p;
+    vector restitution = all(0.0), yields = all(0.0), resolution = all(0.0);
+    for (int c = 0; c < contacts; ++c) {
+        const mask here = cell->number == (double)(c + 1);
+        restitution = choose(here, load(g->restitution[c] + at), restitution);
+        yields = choose(here, load(g->yield_velocity[c] + at), yields);
+        resolution = choose(here, load(g->resolution[c] + at), resolution);
+    }
+    const mask softer = a->hits & (yields > 0.0) & (approach > yields);
+    if (any(softer)) {
+        restitution = choose(softer, restitution / root(root(approach / yields)), restitution);
+    }
+    const vector after = restitution * approach;
+    const vector fastest = larger(load(g->fastest_impact + at), only(a->hits, approach));
+    const mask leaves = a->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
+    store(g->fastest_impact + at, fastest);
+    store(g->hit + at, only(a->hits, cell->number));
+    store(g->approach + at, only(a->hits, approach));
+    a->p = choose(a->hits, -cell->sign * after, a->p);
+    return leaves;
+}
+
+/* Move the clocks by whole cells, which are exact, and a part of one; those at the goal are there exactly. */
+LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector share, mask arrives)
+{
+    const vector length = load(g->cell + at), period = load(g->period + at);
+    const vector rest = load(g->rest + at), whole = cells * length, part = share * length;
+    const vector first = rest + whole, second = first + part;
+    const vector error = error_of_sum(rest, whole, first) + error_of_sum(first, part, second);
+    /* less than four periods: both subtractions are exact */
+    const mask two = second >= 2.0 * period;
+    const vector less = second - only(two, 2.0 * period);
+    const mask one = less >= period;
+    const vector left = less - only(one, period), turns = only(two, all(2.0)) + only(one, all(1.0));
+    const vector low = (error + load(g->rest_low + at)) - turns * load(g->period_low + at);
+    const vector after = left + low;
+    store(g->rest + at, choose(arrives, load(g->goal_rest + at), after));
+    store(g->rest_low + at, choose(arrives, load(g->goal_rest_low + at), low - (after - left)));
+    store(g->periods + at, choose(arrives, load(g->goal_periods + at), load(g->periods + at) + turns));
+}
+
+/* One round of a vector of lanes; true when one of them has an event. */
+LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
+{
+    setting s = begin_round(g, at);
+    const candidate cell = choose_cell(g, at, contacts, &s);
+    arrival a = search(g, at, &s, &cell);
+    const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
+    const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
+    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
+    const mask tells = (load(g->tells + at) > 0.0) | (impacts >= load(g->most_impacts + at));
+    store(g->start_q[0] + at, s.q);
+    store(g->start_p[0] + at, s.p);
+    store(g->start_cosine + at, s.cosine);
+    store(g->start_sine + at, s.sine);
+    store(g->passed + at, cell.passed);
+    store(g->share + at, share);
+    store(g->impacts + at, impacts);
+    store(g->q[0] + at, choose(moves, a.q, cell.q));
+    store(g->p[0] + at, choose(moves, a.p, cell.p));
+    store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
+    move_clock(g, at, s.jumped + cell.passed, share, arrives);
+    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
+    event = choose(a.hits & tells, all((double)VI_EVENT_IMPACT), event);
+    event = choose(arrives, all((double)VI_EVENT_GOAL), event);
+    event = choose(a.careful, all((double)VI_EVENT_CELL), event);
+    event = choose(leaves, all((double)VI_EVENT_LEAVE), event);
+    store(g->event + at, event);
+    return any(event > 0.0);
+}
+
+LANES_INLINE void run_rounds(vi_lane_group *g, int contacts)
+{
+    bool found = false;
+    for (int i = 0; i < MOST_ROUNDS && !found; ++i) {
+        for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
+            found |= one_round(g, at, contacts);
+        }
+    }
+}
+
+#include "lanes/rounds_many.h"
+
+void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
+{
+    if (modes > 1) {
+        run_rounds_many(g, modes, contacts);
+    } else if (contacts < 2) {
+        run_rounds(g, 1); /* without a contact its place is that of an idle lane: nothing meets it */
+    } else {
+        run_rounds(g, 2);
+    }
+}

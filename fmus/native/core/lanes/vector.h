@@ -1,0 +1,122 @@
+/* Vectors of VI_WIDTH numbers and what the lanes do with them: elementwise, so that a lane's bits do not depend on it.
+ *
+ * Included by the files that define VI_WIDTH, one for each instruction set. GNU vector extensions: gcc, clang and zig have
+ * them on every machine.
+ */
+#ifndef VIBROIMPACT_LANE_VECTOR_H
+#define VIBROIMPACT_LANE_VECTOR_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef double vector __attribute__((vector_size(8 * VI_WIDTH), may_alias));
+typedef int64_t mask __attribute__((vector_size(8 * VI_WIDTH), may_alias));
+
+/* All of a round is one function; not under a sanitizer, whose checks in so large a one take minutes to compile. */
+#if defined(__SANITIZE_ADDRESS__)
+#define LANES_INLINE static inline
+#else
+#define LANES_INLINE static inline __attribute__((always_inline))
+#endif
+
+LANES_INLINE vector load(const double *from)
+{
+    return *(const vector *)from;
+}
+
+LANES_INLINE void store(double *to, vector value)
+{
+    *(vector *)to = value;
+}
+
+LANES_INLINE vector all(double value)
+{
+    return value - (vector){0.0};
+}
+
+LANES_INLINE vector choose(mask where, vector a, vector b)
+{
+    return (vector)(((mask)a & where) | ((mask)b & ~where));
+}
+
+/* `a` where the mask is, else 0. */
+LANES_INLINE vector only(mask where, vector a)
+{
+    return (vector)((mask)a & where);
+}
+
+LANES_INLINE vector larger(vector a, vector b)
+{
+    return choose(a > b, a, b);
+}
+
+LANES_INLINE vector smaller(vector a, vector b)
+{
+    return choose(a < b, a, b);
+}
+
+LANES_INLINE vector size_of(vector a)
+{
+    return (vector)((mask)a & INT64_MAX);
+}
+
+LANES_INLINE vector root(vector a)
+{
+    vector r;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        r[i] = sqrt(a[i]);
+    }
+    return r;
+}
+
+LANES_INLINE bool any(mask where)
+{
+    int64_t found = 0;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        found |= where[i];
+    }
+    return found != 0;
+}
+
+/* Rounding error of the sum `sum` = a + b (Knuth). */
+LANES_INLINE vector error_of_sum(vector a, vector b, vector sum)
+{
+    const vector part = sum - a;
+    return (a - (sum - part)) + (b - part);
+}
+
+/* Added to a number below 2^51 it leaves the nearest whole one in the low bits. */
+#define WHOLE 6755399441055744.0
+
+/* Largest whole number <= a, for 0 <= a < 2^51. */
+LANES_INLINE vector whole_part(vector a)
+{
+    const vector near = (a + WHOLE) - WHOLE;
+    return near - only(near > a, all(1.0));
+}
+
+/* Cosine and sine of 0 <= angle <= 8, to 1 ulp (the polynomials are those of fdlibm). */
+LANES_INLINE void turn(vector angle, vector *cosine, vector *sine)
+{
+    const vector shifted = angle * 0.63661977236758134308 + WHOLE;
+    const vector quarters = shifted - WHOLE;
+    const mask count = (mask)shifted;
+    const vector r = (angle - quarters * 1.57079632673412561417) - quarters * 6.07710050650619224932e-11;
+    const vector z = r * r, half = 0.5 * z, w = z * z;
+    const vector odd = (-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03)
+                       + w * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06)
+                              + w * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10));
+    const vector even = (4.16666666666666019037e-02 + z * -1.38888888888741095749e-03)
+                        + w * ((2.48015872894767294178e-05 + z * -2.75573143513906633035e-07)
+                               + w * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11));
+    const vector s = r + (r * z) * odd, one = 1.0 - half;
+    const vector c = one + (((1.0 - one) - half) + w * even);
+    const mask swapped = -(count & 1);
+    *sine = (vector)((mask)choose(swapped, c, s) ^ ((count & 2) << 62));
+    *cosine = (vector)((mask)choose(swapped, s, c) ^ (((count + 1) & 2) << 62));
+}
+
+#endif

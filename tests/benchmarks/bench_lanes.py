@@ -1,0 +1,165 @@
+"""Many points in lanes, in every instruction set of this machine, beside the fused Oscillator and scipy.
+
+P(1,1) of bench_fused, with its errors beside the times; chaos (r .8, no damping, F 1, stop 0, w 2.8); how the cost
+grows with modes, contacts, points and recorded periods. Timed in turns, by processor time; medians are compared.
+
+Run with `python tests/benchmarks/bench_lanes.py [--periods 5000] [--repetitions 7] [--output FOLDER]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from bench_fused import PHASE, VELOCITY, Fused, Peer, machine
+from support import lane_points
+from support.lane_points import IMPACT, TURN, Columns, drawn, run, taken
+
+from vibroimpact.fmus.core import lanes
+from vibroimpact.fmus.core.lanes import Instructions, instructions
+
+POINTS = 64
+HERE = [each for each in Instructions if each and instructions() >= each]
+
+
+class Clock:
+    """Counts the processor time of the calls of C alone."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        lane_points.run_lanes = self._run
+
+    def _run(
+        self,
+        plan: lanes.LanesPlan,
+        points: lanes.LanesPoints,
+        memory: np.ndarray[tuple[int], np.dtype[np.uint8]],
+    ) -> lanes.LanesEnd:
+        began = time.thread_time()
+        end = lanes.run_lanes(plan, points, memory)
+        self.seconds += time.thread_time() - began
+        return end
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """Points, how often they are hit in all, and what of them is recorded."""
+
+    points: Columns
+    impacts: float
+    is_recorded: bool = False
+
+    def seconds(self, clock: Clock, chosen: Instructions) -> float:
+        """Return seconds per impact."""
+        clock.seconds = 0.0
+        run(
+            self.points, impacts=self.is_recorded, extrema=self.is_recorded, instructions=chosen, room=100_000
+        )
+        return clock.seconds / self.impacts
+
+
+def oscillators(periods: int, recorded: int, **values: float) -> Columns:
+    """Return points of mass 1 and stiffness 1 with one stop that differ in where they start."""
+    points = taken(drawn(1, 1, 1, 0), np.zeros(POINTS, np.int64))
+    given = {"held": 0.0, "phase": 0.0, "shape": 1.0, "impulse": 1.0, "observed": 1.0, "stiffness": 1.0}
+    for name, value in {**given, "yield_velocity": 0.0, "direction": 1.0, "force": 1.0, **values}.items():
+        points[name] = np.full(points[name].shape, value)
+    points["start_q"] = values["position"] - np.linspace(0.1, 0.8, POINTS)[None]
+    period = TURN / points["angular_frequency"]
+    return {**points, "begin": periods * period, "end": (periods + recorded) * period}
+
+
+def periodic(periods: int, recorded: int = 1) -> Columns:
+    """Return points that all come to P(1,1)."""
+    body = {"decay": 0.1, "force": 0.5, "angular_frequency": 1.0, "position": 1.0, "restitution": 0.7}
+    return oscillators(periods, recorded, start_p=0.0, **body)
+
+
+def counted(points: Columns, *, is_recorded: bool = False) -> Case:
+    """Return those of the points that run in lanes, with how often they are hit."""
+    whole = {**points, "begin": np.zeros_like(points["begin"])}
+    found = run(whole, extrema=False, periods=False, room=1_000_000)
+    kept = np.flatnonzero(found.has_run)
+    impacts = sum(np.count_nonzero(found.rows[place][:, 0] == IMPACT) for place in kept)
+    return Case(taken(points, kept), impacts, is_recorded)
+
+
+def errors() -> tuple[float, float]:
+    """Return the largest errors of phase (rad) and velocity of the last impacts of P(1,1)."""
+    rows = np.concatenate([each[each[:, 0] == IMPACT] for each in run(periodic(400, 4)).rows])
+    return float(np.abs(rows[:, 2] - PHASE).max()), float(np.abs(rows[:, 3] - VELOCITY).max())
+
+
+def cases(periods: int) -> dict[str, Case]:
+    """Return what is timed, by its name."""
+    chaos = {"decay": 0.0, "angular_frequency": 2.8, "position": 0.0, "restitution": 0.8}
+    found = {
+        "P(1,1)": counted(periodic(periods)),
+        "P(1,1), 8 points": counted(taken(periodic(periods), np.arange(8))),
+        "P(1,1), all periods recorded": counted(periodic(0, min(periods, 500)), is_recorded=True),
+        "chaos": counted(oscillators(periods // 10, 1, start_p=0.1, **chaos)),
+    }
+    for modes, contacts in ((1, 1), (1, 2), (2, 1), (4, 1), (8, 1), (8, 2)):
+        bodies = drawn(200, modes, contacts, seed=3, transient=60, recorded=1)
+        found[f"random bodies: {modes} modes, {contacts} contacts"] = counted(bodies)
+    return found
+
+
+def measure(periods: int, repetitions: int) -> dict[str, float]:
+    """Time all in turns; returns median microseconds per impact by name."""
+    clock, fused, peer = Clock(), Fused(100_000), Peer(1e-6)
+    timed: dict[str, Callable[[], float]] = {
+        "fused Oscillator": lambda: fused.run()[0],
+        peer.name: lambda: peer.run()[0],
+    }
+    for name, case in cases(periods).items():
+        for chosen in HERE:
+            timed[f"{name} ({chosen.name})"] = lambda case=case, chosen=chosen: case.seconds(clock, chosen)  # type: ignore[misc]
+    seconds: dict[str, list[float]] = {name: [] for name in timed}
+    for turn in range(repetitions):
+        for name in timed if turn % 2 == 0 else reversed(list(timed)):
+            seconds[name].append(timed[name]())
+    return {name: 1e6 * statistics.median(each) for name, each in seconds.items()}
+
+
+def main() -> int:
+    """Measure, print the table, write `bench_lanes.json`; return 1 if errors or the ratio miss their goal."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--periods", type=int, default=5000)
+    parser.add_argument("--repetitions", type=int, default=7)
+    parser.add_argument("--output", type=Path, default=None)
+    options = parser.parse_args()
+    found, host = measure(options.periods, options.repetitions), machine()
+    best = HERE[-1].name
+    ratio = found["solve_ivp RK45, rtol 1e-06, events"] / found[f"P(1,1) ({best})"]
+    phase, velocity = errors()
+    print("; ".join(f"{key} {value}" for key, value in host.items()))
+    print(f"{'':60}{'us per impact':>14}")
+    for name, each in found.items():
+        print(f"{name:60}{each:14.3f}")
+    print(
+        f"{options.repetitions} runs in turns: lanes with {best} are {ratio:,.0f} times faster than solve_ivp RK45 at "
+        f"rtol 1e-6 on P(1,1), and exact to {phase:.0e} rad and {velocity:.0e}."
+    )
+    if options.output is not None:
+        options.output.mkdir(parents=True, exist_ok=True)
+        result = {"machine": host, "instructions": best, "ratio": ratio, "microseconds_per_impact": found}
+        result |= {"phase_error": phase, "velocity_error": velocity}
+        (options.output / "bench_lanes.json").write_text(
+            json.dumps(result, indent=2) + "\n", encoding="utf-8"
+        )
+    return 0 if ratio >= 1000.0 and phase <= 1e-13 and velocity <= 1e-13 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

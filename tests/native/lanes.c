@@ -1,0 +1,192 @@
+/* Random points in lanes, bad ones among them: the same bits in every instruction set, whatever the room for rows and the
+ * time of a call, and branches that wait for the scalar engine. */
+#include "lanes/lanes.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "body/record.h"
+#include "check.h"
+
+enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
+
+/* Arrays of some points, and what they come to. */
+typedef struct {
+    double stiffness[STATES], decay[STATES], force[STATES], held[STATES], observed[STATES], start_q[STATES], start_p[STATES];
+    double angular_frequency[POINTS], phase[POINTS], begin[POINTS], end[POINTS];
+    double shape[VI_LANES_CONTACTS * STATES], impulse[VI_LANES_CONTACTS * STATES];
+    double position[VI_LANES_CONTACTS * POINTS], direction[VI_LANES_CONTACTS * POINTS];
+    double restitution[VI_LANES_CONTACTS * POINTS], yield_velocity[VI_LANES_CONTACTS * POINTS];
+    uint8_t first[POINTS];
+} sample;
+
+typedef struct {
+    uint8_t state[POINTS];
+    int8_t outcome[POINTS];
+    double reached[POINTS], displacement[POINTS], velocity[POINTS], final_q[STATES], final_p[STATES];
+    int64_t rows_of[POINTS];
+    double sum_of_rows[POINTS]; /* of all numbers of a point's rows, in their order */
+} results;
+
+static const double TURN = 6.283185307179586;
+
+static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed)
+{
+    for (int j = 0; j < modes; ++j) {
+        const double natural = pow(10.0, uniform(seed, -0.3, 0.7)), ratio = choice(seed, 5) ? 0.03 : uniform(seed, 0.0, 3.0);
+        const int at = j * POINTS + i;
+        s->stiffness[at] = natural * natural;
+        s->decay[at] = ratio * natural;
+        s->force[at] = uniform(seed, -1.5, 1.5);
+        s->held[at] = choice(seed, 2) ? 0.0 : 0.1;
+        s->observed[at] = uniform(seed, 0.5, 1.0);
+        s->start_q[at] = uniform(seed, -0.02, 0.02);
+        s->start_p[at] = uniform(seed, -0.5, 0.5);
+    }
+    for (int k = 0; k < contacts; ++k) {
+        const int at = k * POINTS + i;
+        s->direction[at] = k == 0 ? 1.0 : -1.0;
+        s->position[at] = s->direction[at] * uniform(seed, 0.2, 1.0);
+        s->restitution[at] = uniform(seed, 0.3, 1.0);
+        s->yield_velocity[at] = choice(seed, 2) ? 0.0 : 0.3;
+        for (int j = 0; j < modes; ++j) {
+            const int place = (k * modes + j) * POINTS + i;
+            s->shape[place] = s->impulse[place] = uniform(seed, 0.3, 1.0);
+        }
+    }
+    const double period = TURN / (s->angular_frequency[i] = choice(seed, 20) ? uniform(seed, 0.4, 3.0) : 0.0);
+    s->phase[i] = 0.0;
+    s->begin[i] = isfinite(period) ? 2.0 * period : 3.0;
+    s->end[i] = isfinite(period) ? 7.0 * period : 20.0;
+    s->first[i] = 1;
+}
+
+/* A number that no point can have, somewhere. */
+static void spoil(sample *s, int i, uint64_t *seed)
+{
+    double *const arrays[] = {s->stiffness, s->decay, s->force, s->held, s->start_q, s->start_p, s->angular_frequency,
+                              s->phase, s->begin, s->end, s->observed};
+    const double values[] = {NAN, INFINITY, -INFINITY};
+    arrays[choice(seed, sizeof arrays / sizeof arrays[0])][i] = values[choice(seed, 3)];
+}
+
+static void take_rows(vi_lanes_points *p, results *r)
+{
+    for (int64_t row = 0; row < p->rows_used; ++row) {
+        for (int i = 0; i < VI_RECORD_WIDTH; ++i) {
+            const double value = p->rows[row * VI_RECORD_WIDTH + i];
+            r->sum_of_rows[p->owner[row]] += isnan(value) ? 0.0 : value * (1.0 + i);
+        }
+    }
+    p->rows_used = 0;
+}
+
+static vi_lanes_points points_of(const sample *s, results *r, double *rows, int64_t *owner, double seconds)
+{
+    return (vi_lanes_points){
+        .count = POINTS, .stiffness = s->stiffness, .decay = s->decay, .force = s->force, .held = s->held,
+        .angular_frequency = s->angular_frequency, .phase = s->phase, .shape = s->shape, .impulse = s->impulse,
+        .observed = s->observed, .position = s->position, .direction = s->direction, .restitution = s->restitution,
+        .yield_velocity = s->yield_velocity, .start_q = s->start_q, .start_p = s->start_p, .begin = s->begin,
+        .end = s->end, .first = s->first, .state = r->state, .outcome = r->outcome, .reached = r->reached,
+        .displacement = r->displacement, .velocity = r->velocity, .final_q = r->final_q, .final_p = r->final_p,
+        .rows_of = r->rows_of, .rows = rows, .owner = owner, .rows_room = ROOM, .most_seconds = seconds};
+}
+
+/* Answer the points that are left as a scalar engine would: they end where they began. */
+static void answer(vi_lanes_points *p, int modes)
+{
+    for (int64_t i = 0; i < p->count; ++i) {
+        if (p->state[i] == VI_POINT_IS_LEFT) {
+            p->state[i] = VI_POINT_IS_ANSWERED;
+            for (int j = 0; j < modes; ++j) {
+                p->final_q[j * p->count + i] = p->final_p[j * p->count + i] = 0.01;
+            }
+        }
+    }
+}
+
+static void run(const sample *s, results *r, const vi_lanes_plan *plan, double seconds)
+{
+    static double rows[ROOM * VI_RECORD_WIDTH];
+    static int64_t owner[ROOM];
+    memset(r, 0, sizeof *r);
+    vi_lanes_points p = points_of(s, r, rows, owner, seconds);
+    void *memory = calloc(1, vi_door_lanes_memory(plan));
+    int end = VI_LANES_LISTEN;
+    for (int calls = 0; end != VI_LANES_DONE; ++calls) {
+        CHECK(calls < 100000, "runs that end, got %d calls", calls);
+        end = vi_door_lanes(plan, &p, memory);
+        CHECK(end != VI_LANES_REFUSED, "a plan of %d modes", plan->modes);
+        take_rows(&p, r);
+        if (end == VI_LANES_LEFT) {
+            answer(&p, plan->modes);
+        }
+    }
+    CHECK(p.finished == POINTS, "all points to be done, got %lld", (long long)p.finished);
+    free(memory);
+}
+
+static void compare(const results *a, const results *b, int i, const char *what)
+{
+    CHECK(a->state[i] == b->state[i], "one state of point %d by %s", i, what);
+    if (a->state[i] == VI_POINT_HAS_RUN) {
+        CHECK(memcmp(&a->final_q[i], &b->final_q[i], sizeof a->final_q[i]) == 0, "one end of point %d by %s", i, what);
+        CHECK(a->sum_of_rows[i] == b->sum_of_rows[i] && a->rows_of[i] == b->rows_of[i], "the rows of %d by %s", i, what);
+        CHECK(isfinite(a->displacement[i]) && isfinite(a->velocity[i]), "numbers at the end of point %d", i);
+    }
+}
+
+static void check_sizes(int modes, int contacts, uint64_t *seed)
+{
+    static sample good, bad;
+    static results whole, other;
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200};
+    for (int i = 0; i < POINTS; ++i) {
+        draw_point(&good, i, modes, contacts, seed);
+        good.first[i] = choice(seed, 3) != 0;
+    }
+    run(&good, &whole, &plan, 1e9);
+    for (int set = VI_INSTRUCTIONS_BEST; set <= VI_INSTRUCTIONS_AVX512; ++set) {
+        if (vi_door_lanes_instructions(set)) {
+            plan.instructions = set;
+            run(&good, &other, &plan, set == VI_INSTRUCTIONS_BEST ? 1e9 : 0.0);
+            for (int i = 0; i < POINTS; ++i) {
+                compare(&whole, &other, i, "another instruction set");
+            }
+        }
+    }
+    memset(good.first, 1, sizeof good.first);
+    run(&good, &whole, &plan, 1e9);
+    bad = good;
+    for (int i = 0; i < POINTS; i += 3) {
+        spoil(&bad, i, seed);
+    }
+    run(&bad, &other, &plan, 1e9);
+    int ran = 0;
+    for (int i = 0; i < POINTS; ++i) {
+        if (i % 3 == 0) {
+            CHECK(other.state[i] == VI_POINT_IS_ANSWERED, "the bad point %d to be left", i);
+        } else {
+            compare(&whole, &other, i, "bad neighbours");
+        }
+        ran += whole.state[i] == VI_POINT_HAS_RUN;
+    }
+    CHECK(ran > POINTS / 3, "most points to run in lanes, got %d of %d modes", ran, modes);
+}
+
+int main(void)
+{
+    uint64_t seed = 18;
+    const vi_lanes_plan none[] = {{.modes = 0}, {.modes = VI_LANES_MODES + 1}, {.modes = 1, .contacts = -1},
+                                  {.modes = 1, .contacts = VI_LANES_CONTACTS + 1}, {.modes = 1, .instructions = 4}};
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
+        CHECK(vi_door_lanes_memory(&none[i]) == 0, "plan %zu to be refused", i);
+    }
+    for (int modes = 1; modes <= VI_LANES_MODES; ++modes) {
+        for (int contacts = 0; contacts <= VI_LANES_CONTACTS; ++contacts) {
+            check_sizes(modes, contacts, &seed);
+        }
+    }
+    return 0;
+}

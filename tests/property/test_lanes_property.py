@@ -1,0 +1,232 @@
+"""Points in lanes do what the scalar engines make of them; every instruction set and cut gives the same bits."""
+
+import math
+
+import numpy as np
+import pytest
+from support.component_fmu import OscillatorFmu, forced, stop
+from support.lane_points import IMPACT, PERIOD, TURN, Columns, Results, drawn, follow_alone, run, taken
+from support.tolerance import LONG_PHASE, ORBIT
+
+from vibroimpact.fmus.core.lanes import Instructions, LanesEnd, PointState, instructions
+from vibroimpact.fmus.errors import UsageError
+
+SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1)]
+#: A rounding after some dozen impacts, each of which may multiply it.
+FLIGHTS = 1e-9
+#: Events of one point: elastic bodies between two stops would go on for long.
+MOST = 300
+PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
+"""Of the impacts of P(1,1) of m = k = 1, zeta .1, F .5, w 1, r .7, stop 1: closed form."""
+
+HERE = [each for each in Instructions if each and instructions() >= each]
+
+
+def oscillators(count: int, transient: int, recorded: int, **values: object) -> Columns:
+    """Return oscillators of mass 1 and stiffness 1 with one stop, forced from phase 0."""
+    points = taken(drawn(1, 1, 1, 0), np.zeros(count, np.int64))
+    given = {"held": 0.0, "phase": 0.0, "shape": 1.0, "impulse": 1.0, "observed": 1.0, "stiffness": 1.0}
+    for name, value in {**given, "yield_velocity": 0.0, "direction": 1.0, **values}.items():
+        points[name] = np.broadcast_to(np.asarray(value, dtype=np.float64), points[name].shape).copy()
+    period = TURN / points["angular_frequency"]
+    return {**points, "begin": transient * period, "end": (transient + recorded) * period}
+
+
+def differences(points: Columns, found: Results, place: int) -> float:
+    """Return the largest difference of a point's rows and last state from those of the scalar engine."""
+    with follow_alone(points, place, impact_limit=MOST) as body:
+        begin = points["begin"][place] * (1.0 - 1e-12)
+        rows, impacts, periods = found.rows[place], body.impacts, body.periods
+        impacts, periods = impacts[impacts[:, 1] >= begin], periods[periods[:, 1] >= begin]
+        own = [rows[rows[:, 0] == kind] for kind in (IMPACT, PERIOD)]
+        assert [len(each) for each in own] == [len(impacts), len(periods)]
+        pairs = [(own[0], impacts), (own[1], periods)]
+        pairs += [(found.columns["final_q"][:, place], body.displacement)]
+        return max((float(np.abs(one - other).max()) for one, other in pairs if len(one)), default=0.0)
+
+
+@pytest.mark.parametrize(("modes", "contacts"), SIZES)
+def test_random_bodies_do_in_lanes_what_the_scalar_engine_makes_of_them(modes: int, contacts: int) -> None:
+    points = drawn(40, modes, contacts, seed=10 * modes + contacts)
+    found = run(points, impact_limit=MOST)
+    places = np.flatnonzero(found.has_run)
+    assert len(places) >= 20
+    assert max(differences(points, found, int(place)) for place in places) <= FLIGHTS
+
+
+@pytest.mark.parametrize(("modes", "contacts"), SIZES)
+def test_every_instruction_set_and_every_cut_gives_the_same_bits(modes: int, contacts: int) -> None:
+    points = drawn(40, modes, contacts, seed=20 * modes + contacts)
+    whole = run(points, impact_limit=MOST)
+    for chosen in HERE:
+        assert run(points, impact_limit=MOST, instructions=chosen).same_as(whole)
+    assert run(points, impact_limit=MOST, most_seconds=0.0).same_as(whole)
+    backwards = np.arange(40)[::-1]
+    for places in (backwards, backwards[:13], backwards[:1]):
+        part = run(taken(points, places), impact_limit=MOST)
+        assert np.array_equal(part.columns["final_q"], whole.columns["final_q"][:, places], equal_nan=True)
+        assert all(
+            np.array_equal(rows, whole.rows[place], equal_nan=True)
+            for rows, place in zip(part.rows, places, strict=True)
+        )
+
+
+def test_rows_that_find_no_room_are_asked_for() -> None:
+    points = drawn(60, 1, 2, seed=5, recorded=60)
+    small, large = run(points, impact_limit=MOST), run(points, impact_limit=MOST, room=100_000)
+    assert LanesEnd.full in small.ends
+    assert LanesEnd.full not in large.ends
+    assert small.same_as(large)
+
+
+BAD = {
+    "stiffness": (math.nan, -1.0, 0.0, math.inf),
+    "decay": (math.nan, -0.1),
+    "force": (math.nan, math.inf),
+    "angular_frequency": (math.nan, -1.0, 1e-305),
+    "phase": (math.inf,),
+    "impulse": (0.0, -1.0, math.nan),
+    "position": (math.nan, -5.0),
+    "direction": (0.0,),
+    "restitution": (math.nan, 1.01, -0.01),
+    "yield_velocity": (-1.0, math.nan),
+    "start_q": (math.nan, 7.0),
+    "end": (math.nan, -1.0),
+}
+
+
+@pytest.mark.parametrize("modes", [1, 2])
+def test_a_point_that_a_body_refuses_is_left_and_its_neighbours_do_not_know(modes: int) -> None:
+    cases = [(name, value) for name, values in BAD.items() for value in values]
+    good = drawn(2 * len(cases), modes, 1, seed=3)
+    points = {name: array.copy() for name, array in good.items()}
+    spoilt = np.arange(0, 2 * len(cases), 2)
+    for place, (name, value) in zip(spoilt, cases, strict=True):
+        points[name][..., place] = value
+    found, others = run(points, impact_limit=MOST), run(taken(good, spoilt + 1), impact_limit=MOST)
+    assert np.all(found.columns["state"][spoilt] == PointState.is_left)
+    for name in ("state", "outcome", "reached"):
+        assert np.array_equal(found.columns[name][spoilt + 1], others.columns[name], equal_nan=True)
+    for place, rows in zip(spoilt + 1, others.rows, strict=True):
+        assert np.array_equal(found.rows[place], rows, equal_nan=True)
+
+
+def test_the_impacts_of_a_periodic_orbit_are_those_of_the_closed_form() -> None:
+    start = {"start_q": np.linspace(0.2, 0.9, 24), "start_p": np.linspace(-0.5, 0.5, 24)}
+    body = {"decay": 0.1, "force": 0.5, "angular_frequency": 1.0, "position": 1.0, "restitution": 0.7}
+    found = run(oscillators(24, 400, 3, **body, **start))
+    assert found.has_run.all()
+    for rows in found.rows:
+        impacts = rows[rows[:, 0] == IMPACT]
+        assert len(impacts) == 3
+        assert np.abs(impacts[:, 2] - PHASE).max() <= ORBIT
+        assert np.abs(impacts[:, 3] - VELOCITY).max() <= ORBIT
+
+
+def test_the_phase_of_a_periodic_orbit_is_as_exact_after_a_quarter_of_a_million_periods() -> None:
+    body = {"decay": 0.1, "force": 0.5, "angular_frequency": 1.0, "position": 1.0, "restitution": 0.7}
+    found = run(oscillators(8, 250_000, 1, **body, start_q=np.linspace(0.2, 0.9, 8), start_p=0.0))
+    phases = [rows[rows[:, 0] == IMPACT][0, 2] for rows in found.rows]
+    assert np.abs(np.array(phases) - PHASE).max() <= LONG_PHASE
+
+
+def test_the_first_ten_impacts_of_chaos_are_those_of_the_oscillator() -> None:
+    start = np.linspace(-0.9, -0.1, 12)
+    body = {"decay": 0.0, "force": 1.0, "angular_frequency": 2.8, "position": 0.0, "restitution": 0.8}
+    points = oscillators(12, 0, 15, **body, start_q=start, start_p=0.1)
+    found = run(points)
+    for place in np.flatnonzero(found.has_run):
+        parameters = forced(1.0, 2.8, 0.0, displacement_start=start[place], velocity_start=0.1)
+        with OscillatorFmu({**parameters, **stop(0.0, 0.8), "record.impacts": True}) as o:
+            o.step(float(points["end"][place]))
+            alone = o.rows()
+        impacts = found.rows[place][found.rows[place][:, 0] == IMPACT]
+        assert len(impacts) >= 10
+        assert np.abs(impacts[:10, 1:] - alone[:10, 1:]).max() <= 1e-11
+
+
+LEVELS = [10.0**-n for n in (2, 3, 4, 5, 6, 7, 8, 9, 10)]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
+    # a steady motion whose peak exceeds the stop ever less, from eight phases; and one that stays below it
+    zeta, w = 0.05, 0.8
+    size, lag = math.hypot(1.0 - w * w, 2.0 * zeta * w), math.atan2(2.0 * zeta * w, 1.0 - w * w)
+    excess, phase = (each.ravel() for each in np.meshgrid(LEVELS, TURN * np.arange(8) / 8 + 0.1))
+    amplitude = 1.0 + sign * excess
+    points = oscillators(
+        len(excess),
+        0,
+        3,
+        decay=zeta,
+        angular_frequency=w,
+        force=amplitude * size,
+        phase=phase,
+        start_q=np.minimum(1.0 - 1e-9, amplitude * np.cos(phase - lag)),
+        start_p=-w * amplitude * np.sin(phase - lag),
+        position=1.0,
+        restitution=0.7,
+    )
+    points["begin"] = np.zeros(len(excess))
+    found = run(points)
+    impacts = np.array([np.count_nonzero(rows[:, 0] == IMPACT) for rows in found.rows])
+    if sign > 0.0:
+        assert np.all((impacts > 0) | ~found.has_run)  # what rounding would decide is left
+    else:
+        assert np.all(impacts == 0)
+    assert np.count_nonzero(found.has_run) >= 0.9 * len(excess)
+
+
+def test_a_branch_goes_on_from_where_the_point_before_has_ended() -> None:
+    body = {"decay": 0.1, "force": 0.5, "angular_frequency": np.linspace(0.8, 1.1, 12), "position": 1.0}
+    points = oscillators(12, 4, 3, **body, restitution=0.7, start_q=0.1, start_p=0.2)
+    points["first"] = np.array([1, 0, 0, 0] * 3, np.uint8)
+    found = run(points)
+    assert found.has_run.all()
+    for place in range(12):
+        alone = taken(points, np.array([place]))
+        if not points["first"][place]:
+            alone["start_q"], alone["start_p"] = (
+                found.columns[name][:, place - 1 : place] for name in ("final_q", "final_p")
+            )
+        assert np.array_equal(run(alone).rows[0], found.rows[place])
+
+
+def test_a_point_that_is_left_holds_up_its_branch_alone() -> None:
+    points = drawn(9, 1, 1, seed=8)
+    points["first"] = np.array([1, 0, 0] * 3, np.uint8)
+    points["restitution"][0, 4] = 2.0
+    found = run(points, impact_limit=MOST)
+    assert found.ends[-1] is LanesEnd.left
+    waiting, left = PointState.waits, PointState.is_left
+    assert list(found.columns["state"][3:6]) == [PointState.has_run, left, waiting]
+
+
+def test_a_run_ends_at_its_limit_of_impacts() -> None:
+    points = oscillators(
+        3, 0, 50, decay=0.0, force=0.0, angular_frequency=1.0, position=0.5, restitution=1.0, start_q=-1.0
+    )
+    found = run(points, impact_limit=7)
+    assert list(found.columns["outcome"]) == [2, 2, 2]
+    assert all(np.count_nonzero(rows[:, 0] == IMPACT) == 7 for rows in found.rows)
+    assert np.array_equal(found.columns["reached"], [rows[-1, 1] for rows in found.rows])
+
+
+def test_an_instruction_set_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VIBROIMPACT_INSTRUCTIONS", "baseline")
+    assert instructions() is Instructions.baseline
+    monkeypatch.setenv("VIBROIMPACT_INSTRUCTIONS", "mmx")
+    with pytest.raises(UsageError, match=r"VIBROIMPACT_INSTRUCTIONS: expected .*baseline.*, got 'mmx'"):
+        instructions()
+
+
+@pytest.mark.parametrize(("modes", "contacts"), [(0, 1), (9, 1), (1, 3)])
+def test_more_modes_or_contacts_than_lanes_have_are_refused(modes: int, contacts: int) -> None:
+    with pytest.raises(UsageError, match=f"got {modes}, {contacts} and 0"):
+        run(drawn(1, modes, contacts, 0) if contacts < 3 and modes else _sized(modes, contacts))
+
+
+def _sized(modes: int, contacts: int) -> Columns:
+    points = drawn(1, 1, 1, 0)
+    return {**points, "stiffness": np.ones((modes, 1)), "position": np.ones((contacts, 1))}

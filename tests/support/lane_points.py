@@ -1,0 +1,193 @@
+"""Random bodies of few modes between rigid stops: as points of the lanes, and one by one as structures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from support.structure import Modes, Stop, Structure
+from vibroimpact.fmus.core.lanes import (
+    Instructions,
+    LanesEnd,
+    LanesPlan,
+    LanesPoints,
+    PointState,
+    lanes_memory,
+    run_lanes,
+)
+from vibroimpact.fmus.core.runs import address
+
+Array = NDArray[np.float64]
+Columns = dict[str, NDArray[Any]]
+TURN = 2.0 * math.pi
+WIDTH = 8
+IMPACT, PERIOD = 1.0, 3.0
+OF_MODES = ("stiffness", "decay", "force", "held", "observed", "start_q", "start_p")
+OF_CONTACTS = ("position", "direction", "restitution", "yield_velocity")
+
+
+@dataclass
+class Results:
+    """What the lanes made of points: columns of `LanesPoints`, and the rows of each point that has run."""
+
+    columns: Columns
+    rows: list[Array]
+    ends: list[LanesEnd] = field(default_factory=list)
+
+    @property
+    def has_run(self) -> NDArray[np.bool_]:
+        """Whether the lanes ran each point."""
+        ran: NDArray[np.bool_] = self.columns["state"] == PointState.has_run
+        return ran
+
+    def same_as(self, other: Results) -> bool:
+        """Whether both are the same, bit for bit."""
+        columns = all(
+            np.array_equal(column, other.columns[name], equal_nan=column.dtype == np.float64)
+            for name, column in self.columns.items()
+        )
+        return columns and all(map(_same, self.rows, other.rows))
+
+
+def _same(one: Array, other: Array) -> bool:
+    return np.array_equal(one, other, equal_nan=True)
+
+
+def run(
+    points: Columns,
+    *,
+    impacts: bool = True,
+    extrema: bool = True,
+    periods: bool = True,
+    impact_limit: int = 0,
+    instructions: Instructions = Instructions.best,
+    room: int = 4096,
+    most_seconds: float = 1e9,
+) -> Results:
+    """Run points to their end, through all calls that it takes.
+
+    Parameters
+    ----------
+    points : dict of str to ndarray
+        Arrays of `LanesPoints.GIVEN`, the last axis over the points.
+    impacts, extrema, periods, impact_limit, instructions
+        Of the plan.
+    room : int
+        For rows, in one call.
+    most_seconds : float
+        Of one call.
+    """
+    count, modes, contacts = (
+        points["angular_frequency"].size,
+        len(points["stiffness"]),
+        len(points["position"]),
+    )
+    results: Columns = {
+        "state": np.zeros(count, np.uint8),
+        "outcome": np.zeros(count, np.int8),
+        "rows_of": np.zeros(count, np.int64),
+        **{name: np.full(count, np.nan) for name in ("reached", "displacement", "velocity")},
+        **{name: np.full((modes, count), np.nan) for name in ("final_q", "final_p")},
+    }
+    block = {"rows": np.zeros((room, WIDTH)), "owner": np.zeros(room, np.int64)}
+    plan = LanesPlan(modes, contacts, impacts, extrema, periods, instructions, impact_limit)
+    state = LanesPoints(count=count, rows_room=room, most_seconds=most_seconds)
+    given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
+    for name, array in (given | results | block).items():
+        setattr(state, name, address(array))
+    memory = lanes_memory(plan)
+    ends: list[LanesEnd] = []
+    rows: list[Array] = []
+    owners: list[NDArray[np.int64]] = []
+    while not ends or ends[-1] in (LanesEnd.listen, LanesEnd.full):
+        ends.append(run_lanes(plan, state, memory))
+        rows.append(block["rows"][: state.rows_used].copy())
+        owners.append(block["owner"][: state.rows_used].copy())
+        state.rows_used = 0
+    all_rows, all_owners = np.concatenate(rows), np.concatenate(owners)
+    ran = results["state"] == PointState.has_run
+    own: list[Array] = [
+        all_rows[all_owners == point] if ran[point] else all_rows[:0] for point in range(count)
+    ]
+    assert [len(each) for each in own] == list(results["rows_of"] * ran)
+    return Results(results, own, ends)
+
+
+def taken(points: Columns, places: NDArray[np.int64]) -> Columns:
+    """Return some of the points."""
+    return {name: array[..., places] for name, array in points.items()}
+
+
+def drawn(
+    count: int, modes: int, contacts: int, seed: int, *, transient: int = 3, recorded: int = 4
+) -> Columns:
+    """Draw points: light to strong damping, critical damping among it; forced, from phases of all quarters.
+
+    Parameters
+    ----------
+    count, modes, contacts : int
+        Sizes.
+    seed : int
+        Of the numbers.
+    transient, recorded : int
+        Forcing periods before the recording, and in it.
+    """
+    random = np.random.default_rng(seed)
+    natural = np.sort(np.exp(random.uniform(-0.7, 1.0 if modes == 1 else 2.0, (modes, count))), axis=0)
+    ratio = random.uniform(0.0, 0.1, (modes, count))
+    strong = random.random((modes, count)) < 0.2
+    ratio[strong] = random.choice([0.0, 0.9999, 1.0, 1.3, 2.5], strong.sum())
+    shape = random.uniform(0.4, 1.2, (max(contacts, 1), modes, count))
+    shape[:, 1:] *= random.choice([-1.0, 1.0], (max(contacts, 1), modes - 1, count))
+    position = np.array([[1.0], [-1.0]])[:contacts] * random.uniform(0.2, 1.5, (contacts, count))
+    frequency = np.exp(random.uniform(-1.0, 1.2, count))
+    phase = np.where(random.random(count) < 0.5, 0.0, random.uniform(-4.0, 4.0, count))
+    first = transient + (phase % TURN > 0.0)
+    lag = (phase % TURN) / frequency
+    return {
+        "stiffness": natural**2,
+        "decay": ratio * natural,
+        "force": random.uniform(-1.5, 1.5, (modes, count)),
+        "held": random.choice([0.0, 0.2], (modes, count)),
+        "angular_frequency": frequency,
+        "phase": phase,
+        "shape": shape[:contacts],
+        "impulse": shape[:contacts].copy(),
+        "observed": shape[0].copy(),
+        "position": position,
+        "direction": np.sign(position),
+        "restitution": random.uniform(0.3, 1.0, (contacts, count)),
+        "yield_velocity": random.choice([0.0, 0.0, 0.4], (contacts, count)),
+        "start_q": random.uniform(-0.05, 0.05, (modes, count)),
+        "start_p": random.uniform(-0.5, 0.5, (modes, count)),
+        "begin": first * (TURN / frequency) - lag,
+        "end": (first + recorded) * (TURN / frequency) - lag,
+        "first": np.ones(count, np.uint8),
+    }
+
+
+def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Structure:
+    """Run one of the points by the scalar engine of bodies of many modes, recording from its start."""
+    p = {name: array[..., place] for name, array in points.items()}
+    natural = np.sqrt(p["stiffness"])
+    modes = Modes(natural, p["decay"] / natural, p["force"], float(p["angular_frequency"]), float(p["phase"]))
+    stops = [
+        Stop(
+            p["shape"][k],
+            float(p["position"][k]),
+            side="upper" if p["direction"][k] > 0.0 else "lower",
+            restitution=float(p["restitution"][k]),
+            yield_velocity=float(p["yield_velocity"][k]),
+            impulse=p["impulse"][k],
+        )
+        for k in range(len(p["position"]))
+    ]
+    body = Structure(
+        modes, stops, p["start_q"], p["start_p"], observed=p["observed"], extrema=True, periods=True
+    )
+    body.advance(float(p["end"]), held=p["held"], most_impacts=impact_limit)
+    return body
