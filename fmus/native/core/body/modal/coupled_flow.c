@@ -33,7 +33,7 @@ static double fastest_rate(const vi_structure_model *model, const vi_drift_start
     if (stiffness == 0.0 && damping == 0.0) {
         return model->fastest;
     }
-    for (int j = 0; j < model->modes && !model->coupled; ++j) {
+    for (int j = 0; j < vi_structure_modes(model) && !model->coupled; ++j) {
         drag = vi_max(drag, 2.0 * model->mode[j].decay);
     }
     const double decay = 0.5 * (drag + damping);
@@ -65,16 +65,16 @@ static void set_up_contacts(equation *e, const vi_structure_model *model, const 
             e->yields[e->yielding++] = k;
         }
         for (int j = 0; j < e->width; ++j) {
-            e->toward[k][j] = j < model->modes ? start->sign[k] * model->shape[k][j] : 0.0;
+            e->toward[k][j] = j < vi_structure_modes(model) ? start->sign[k] * model->shape[k][j] : 0.0;
         }
     }
 }
 
 static void set_up(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
-    e->width = VI_WHOLE_LANES(model->modes);
+    e->width = VI_WHOLE_LANES(vi_structure_modes(model));
     for (int j = 0; j < e->width; ++j) {
-        const bool moves = j < model->modes;
+        const bool moves = j < vi_structure_modes(model);
         const vi_mode *mode = &model->mode[moves ? j : 0];
         e->stiffness[j] = moves ? mode->stiffness : 0.0;
         e->drag[j] = moves && !model->coupled ? 2.0 * mode->decay : 0.0;
@@ -181,7 +181,7 @@ static void drag(vi_drift *drift, int n, double share)
 {
     const vi_structure_model *model = drift->model;
     const double order = (double)(n + 1);
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         drift->modal[n + 2][j] -= share * order * vi_structure_at(model, model->coupling[j], drift->modal[n + 1]);
     }
 }
@@ -213,7 +213,7 @@ static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
     const vi_structure_model *model = drift->model;
     for (int k = 0; k < model->contacts; ++k) {
         double size = 0.0;
-        for (int j = 0; j < model->modes; ++j) {
+        for (int j = 0; j < vi_structure_modes(model); ++j) {
             const vi_mode *mode = &model->mode[j];
             double terms = fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j]);
             terms += vi_structure_drag_size(model, j, start->p);
@@ -304,7 +304,7 @@ static void start_series(vi_drift *drift, const equation *e, const vi_drift_star
     memset(drift->force, 0, (size_t)model->contacts * sizeof drift->force[0]);
     for (int j = 0; j < e->width; ++j) {
         drift->modal[0][j] = 0.0;
-        drift->modal[1][j] = j < model->modes ? start->p[j] : 0.0;
+        drift->modal[1][j] = j < vi_structure_modes(model) ? start->p[j] : 0.0;
     }
     extend_penetrations(drift, e, 1);
     for (int k = 0; k < model->contacts; ++k) {
@@ -357,7 +357,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
 
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[])
 {
-    const int modes = drift->model->modes, least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
+    const int modes = vi_structure_modes(drift->model), least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
     const double r = vi_drift_variable(drift, u);
     for (int j = 0; j < modes; j += VI_LANES) {
         double x[VI_LANES], v[VI_LANES] = {0.0};

@@ -42,7 +42,7 @@ static void extend(vi_drift *drift, const entry *at, double drive, int n)
     const double *x = drift->modal[n], *v = drift->modal[n + 2], *shape = model->shape[at->contact];
     const double push = at->start->sign[at->contact] * drift->force[at->contact][n], rate = 0.5 * (double)(n + 2);
     const double share = 4.0 / ((double)(n + 4) * (double)(n + 2));
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         double load = drive * mode->force - mode->stiffness * x[j] - rate * (2.0 * mode->decay * v[j])
                       - shape[j] * push;
@@ -62,7 +62,7 @@ static void start_series(vi_drift *drift, const entry *at)
     memset(drift->force, 0, (size_t)model->contacts * sizeof drift->force[0]);
     memset(drift->force_scale, 0, sizeof drift->force_scale);
     memset(drift->modal, 0, 4 * sizeof drift->modal[0]);
-    memcpy(drift->modal[2], at->start->p, (size_t)model->modes * sizeof(double));
+    memcpy(drift->modal[2], at->start->p, (size_t)vi_structure_modes(model) * sizeof(double));
     for (int k = 0; k < model->contacts; ++k) {
         drift->penetration[k][0] = k == at->contact ? 0.0 : at->start->penetration[k];
         drift->penetration[k][1] = drift->penetration[k][3] = 0.0;
@@ -83,7 +83,7 @@ static double whole_power(double r, int n)
 static double share_of_terms(const vi_drift *drift, const double depth[], int n)
 {
     double first = 0.0, last = 0.0;
-    for (int j = 0; j < drift->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(drift->model); ++j) {
         first = vi_max(first, fabs(drift->modal[2][j]));
         last = vi_max(last, fabs(drift->modal[n][j]));
     }

@@ -60,12 +60,12 @@ static double forcing_work(const sums *sum)
     const vi_structure_model *model = sum->s->model;
     const mover *turning = &sum->mover[sum->count - 2];
     double force[VI_MODES], work = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         force[j] = model->mode[j].force;
     }
     for (int i = 0; i < sum->count; ++i) {
         const mover *m = &sum->mover[i];
-        const vi_complex power = vi_complex_scale(0.5, seen(model->modes, m, force));
+        const vi_complex power = vi_complex_scale(0.5, seen(vi_structure_modes(model), m, force));
         const vi_complex with = vi_product_integral(m->rate, m->from, m->to, turning->rate, turning->from, turning->to,
                                                     sum->length);
         const vi_complex against = vi_product_integral(m->rate, m->from, m->to, vi_complex_conjugate(turning->rate),
@@ -84,7 +84,7 @@ static double load_work(const sums *sum, const double q[])
     const double u = sum->length, *rate = s->state->held_rate;
     double held[VI_MODES], still = 0.0, grown = 0.0;
     vi_structure_held_now(s, held);
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const double moved = s->state->q[j] - q[j];
         still += held[j] * moved;
         grown += rate[j] * (u * (s->state->q[j] - sum->flow->level[j] - 0.5 * u * sum->flow->level_rate[j]));
@@ -92,7 +92,7 @@ static double load_work(const sums *sum, const double q[])
     for (int i = 0; i < sum->count - 1; ++i) { /* the integral of the displacement, but for its level */
         const mover *m = &sum->mover[i];
         vi_complex way = {0.0, 0.0};
-        for (int j = 0; j < s->model->modes; ++j) {
+        for (int j = 0; j < vi_structure_modes(s->model); ++j) {
             way = vi_complex_add(way, vi_complex_scale(rate[j], m->vector[j]));
         }
         grown -= vi_complex_multiply(way, vi_term_integral(m->rate, m->from, m->to, u)).re;

@@ -44,14 +44,14 @@ int vi_pressed_contacts(const vi_structure *s, int32_t port[VI_PORTS])
 static void describe(const vi_structure *s, const int32_t port[], int contacts, vi_pressed_body *body)
 {
     const vi_structure_model *model = s->model;
-    body->modes = model->modes;
+    body->modes = vi_structure_modes(model);
     body->contacts = contacts;
-    body->coupled = model->coupled && model->modes > 1;
-    for (int j = 0; j < model->modes; ++j) {
+    body->coupled = model->coupled && vi_structure_modes(model) > 1;
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         body->square[j] = model->mode[j].stiffness;
         body->decay[j] = 0.5 * vi_structure_damping(model, j, j);
         if (body->coupled) {
-            memcpy(body->coupling[j], model->coupling[j], (size_t)model->modes * sizeof body->coupling[j][0]);
+            memcpy(body->coupling[j], model->coupling[j], (size_t)vi_structure_modes(model) * sizeof body->coupling[j][0]);
         }
     }
     for (int i = 0; i < contacts; ++i) {
@@ -60,7 +60,7 @@ static void describe(const vi_structure *s, const int32_t port[], int contacts, 
         body->held[i] = s->state->status[k] == VI_CONTACT_HELD;
         body->stiffness[i] = body->held[i] ? 0.0 : law->stiffness;
         body->damping[i] = body->held[i] ? 0.0 : law->damping;
-        for (int j = 0; j < model->modes; ++j) {
+        for (int j = 0; j < vi_structure_modes(model); ++j) {
             body->shape[i][j] = vi_structure_direction(s, k) * model->shape[k][j];
         }
     }
@@ -86,7 +86,7 @@ static bool same_body(const vi_pressed_body *a, const vi_pressed_body *b)
 /* Does it rest as asked, seen from the same points? */
 static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
 {
-    const size_t size = (size_t)model->modes * sizeof(double);
+    const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
     bool same = pressed->known != VI_MODES_UNKNOWN && pressed->contacts == model->contacts
                 && same_body(&pressed->asked, &pressed->body)
                 && memcmp(pressed->observed, model->observed, size) == 0;
@@ -295,7 +295,7 @@ bool vi_pressed_goes_on(const vi_structure *s)
         return false;
     }
     vi_structure_held_now(s, held);
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         if (s->state->q[j] != origin->reached_q[j] || s->state->p[j] != origin->reached_p[j]
             || held[j] != origin->held[j] || s->state->held_rate[j] != 0.0) {
             return false;
@@ -329,7 +329,7 @@ void vi_pressed_flow_follow(vi_pressed_flow *flow, const vi_structure *s)
 
 void vi_pressed_flow_reach(const vi_structure *s)
 {
-    const size_t size = (size_t)s->model->modes * sizeof(double);
+    const size_t size = (size_t)vi_structure_modes(s->model) * sizeof(double);
     memcpy(s->state->rest.reached_q, s->state->q, size);
     memcpy(s->state->rest.reached_p, s->state->p, size);
 }

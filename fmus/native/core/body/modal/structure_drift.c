@@ -158,7 +158,7 @@ static void add_impulses(const vi_structure *s, const vi_drift *drift, const vi_
 static double energy_now(const vi_structure *s)
 {
     double elastic = 0.0;
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         elastic += 0.5 * s->model->mode[j].stiffness * s->state->q[j] * s->state->q[j];
     }
     return vi_structure_kinetic(s) + elastic;
@@ -195,7 +195,7 @@ static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const
     if (s->record->periods) {
         return false;
     }
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const bool forced = mode->force != 0.0 && model->clock.angular_frequency > 0.0;
         const double load = fabs(now->held[j]) + fabs(mode->force) + mode->stiffness * fabs(s->state->q[j]);
@@ -210,7 +210,7 @@ static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const
 /* What a drift costs, in evaluations of a mode. */
 static int64_t drift_evaluations(const vi_structure_model *model)
 {
-    const int64_t modes = model->modes;
+    const int64_t modes = vi_structure_modes(model);
     return VI_ORDER * modes + (model->coupled ? modes * modes / 2 : 0);
 }
 

@@ -44,7 +44,7 @@ bool vi_structure_stays(const vi_structure *s, const vi_drift *drift, int k, con
 {
     const double moved = vi_polynomial_size(clearance, length);
     double terms = s->state->status[k] == VI_CONTACT_FREE ? vi_structure_displacement_size(s, k) : 0.0;
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         double size = 0.0;
         for (int n = VI_ORDER; n >= 0; --n) {
             size = size * length + fabs(drift->modal[n][j]);

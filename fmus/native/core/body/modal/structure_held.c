@@ -75,7 +75,7 @@ static double force_noise(const vi_series_noise *noise, int l)
     }
     const vi_contact_force slopes = vi_structure_yield(s, l);
     double displacement = 0.0, rate = 0.0;
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         displacement += fabs(s->model->shape[l][j]) * noise->before[j];
         rate += fabs(s->model->shape[l][j]) * noise->last[j];
     }
@@ -91,7 +91,7 @@ static void carry(vi_series_noise *noise)
     for (int l = 0; l < model->contacts; ++l) {
         forces[l] = force_noise(noise, l);
     }
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const double stiffness = model->mode[j].stiffness;
         const double terms = load_size(noise, j) + stiffness * fabs(noise->drift->modal[n - 2][j])
                              + (double)(n - 1) * vi_structure_drag_size(model, j, noise->drift->modal[n - 1]);
@@ -102,8 +102,8 @@ static void carry(vi_series_noise *noise)
         }
         next[j] = (VI_ROUNDING * terms + carried) / ((double)n * (double)(n - 1));
     }
-    memcpy(noise->before, noise->last, (size_t)model->modes * sizeof *next);
-    memcpy(noise->last, next, (size_t)model->modes * sizeof *next);
+    memcpy(noise->before, noise->last, (size_t)vi_structure_modes(model) * sizeof *next);
+    memcpy(noise->last, next, (size_t)vi_structure_modes(model) * sizeof *next);
     noise->drive *= model->clock.angular_frequency / (double)(n - 1);
     ++noise->n;
 }
@@ -116,7 +116,7 @@ void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const 
     noise->drive = 1.0;
     noise->n = 2;
     vi_structure_held_now(s, noise->held);
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const vi_mode *mode = &s->model->mode[j];
         const double loads = fabs(mode->force) + fabs(noise->held[j]);
         const double velocity = fabs(drift->modal[1][j]) + mode->natural * fabs(s->state->q[j]) + loads * radian;
@@ -131,7 +131,7 @@ double vi_series_noise_next(vi_series_noise *noise, int k)
     const vi_structure_model *model = noise->s->model;
     double sum = 0.0;
     carry(noise);
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         sum += fabs(model->shape[k][j]) * noise->last[j];
     }
     return sum;

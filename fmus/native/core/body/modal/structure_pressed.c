@@ -25,7 +25,7 @@ static const double MARGIN = 16.0;
 /* A body that stands still stays where it is to the last bit. */
 static bool moves(const vi_structure *s)
 {
-    for (int j = 0; j < s->model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         if (s->state->p[j] != 0.0) {
             return true;
         }
@@ -59,13 +59,13 @@ static int64_t patience(const vi_structure *s)
 /* Radians of the fastest rate from which a rest pays the finding of its modes. */
 static double pays(const vi_structure *s)
 {
-    return s->model->varies ? LEAST_REST * (double)s->model->modes : LEAST_REST;
+    return s->model->varies ? LEAST_REST * (double)vi_structure_modes(s->model) : LEAST_REST;
 }
 
 /* And the modes of several contacts, or of coupled damping; the series have spent so many already. */
 static bool pays_for_all(const vi_structure *s, double radians)
 {
-    const double modes = (double)s->model->modes, spent = s->model->varies ? 0.0 : (double)s->state->series;
+    const double modes = (double)vi_structure_modes(s->model), spent = s->model->varies ? 0.0 : (double)s->state->series;
     return radians + spent >= ALL_MODES * modes * modes || vi_pressed_goes_on(s);
 }
 
@@ -187,7 +187,7 @@ static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double s
 /* Is the observed point one that is held? */
 static bool sees_only_the_stop(const vi_structure *s)
 {
-    const size_t size = (size_t)s->model->modes * sizeof(double);
+    const size_t size = (size_t)vi_structure_modes(s->model) * sizeof(double);
     for (int k = 0; k < s->model->contacts; ++k) {
         if (s->state->status[k] == VI_CONTACT_HELD && memcmp(s->model->observed, s->model->shape[k], size) == 0) {
             return true;
@@ -199,7 +199,7 @@ static bool sees_only_the_stop(const vi_structure *s)
 static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fastest, double u)
 {
     vi_structure_state *state = s->state;
-    vi_budget_spend(&state->budget, (int64_t)flow->pressed->modes.terms * s->model->modes / 4);
+    vi_budget_spend(&state->budget, (int64_t)flow->pressed->modes.terms * vi_structure_modes(s->model) / 4);
     if (s->record->extrema && !sees_only_the_stop(s)) {
         extreme(s, flow, 1.0, fastest, u);
         extreme(s, flow, -1.0, fastest, u);

@@ -16,7 +16,7 @@ static double jerk_size(const vi_structure *s, int k, const double acceleration[
 {
     const vi_structure_model *model = s->model;
     double square = 0.0;
-    for (int j = 0; j < model->modes; ++j) {
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const double damped = model->coupled ? vi_structure_at(model, model->coupling[j], acceleration)
                                              : 2.0 * mode->decay * acceleration[j];
