@@ -298,7 +298,10 @@ static verdict judge(const scanner *s, const vi_scan_level *level, const place *
         return UNDECIDED;
     }
     if (b.clearance < -margin) {
-        *found = (vi_scan_found){k, s->at.u, end->u, s->at.u + guess(a, &b, level->step)};
+        found->contact = k;
+        found->low = s->at.u;
+        found->high = end->u;
+        found->guess = s->at.u + guess(a, &b, level->step);
         return HAS_CONTACT;
     }
     return b.clearance > margin ? CLEARED : UNDECIDED;
@@ -350,7 +353,7 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
     begin(&s, from, first);
     const int longest = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
     int l = level_for(&s, longest);
-    for (int block = 0; block < MOST_BLOCKS && l >= 0; ++block) {
+    for (found->blocks = 0; found->blocks < MOST_BLOCKS && l >= 0; ++found->blocks) {
         vi_scan_level *level = &scan->level[l];
         if (level->step == 0.0) {
             make(level, scan, flight->model, l);

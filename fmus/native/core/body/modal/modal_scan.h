@@ -38,6 +38,7 @@ typedef struct {
     int contact;
     double low, high; /* s after the start */
     double guess;     /* where the contact is to some digits */
+    int blocks;       /* of samples that were taken */
 } vi_scan_found;
 
 /* Scan a flight without series from an instant of it, at which the contacts' approaches are these. `looked_for[k]`: is

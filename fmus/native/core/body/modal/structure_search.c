@@ -188,6 +188,7 @@ static bool scan_on(const vi_structure *s, const vi_flight *flight, const vi_poi
 {
     vi_scan_found bracket;
     const vi_scan_end came_to = vi_scan_flight(s->scan, flight, points, looked_for, &found->now, approach, &bracket);
+    vi_budget_spend(&s->state->budget, (int64_t)bracket.blocks * vi_structure_modes(s->model));
     *end = VI_SEARCH_NOTHING;
     found->u = came_to == VI_SCAN_CLEAR ? flight->length : bracket.low;
     if (came_to == VI_SCAN_BRACKET && close_in(s, flight, &points[bracket.contact], &bracket, found)) {
