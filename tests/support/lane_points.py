@@ -93,7 +93,7 @@ def run(
         **{name: np.full(count, np.nan) for name in ("reached", "displacement", "velocity")},
         **{name: np.full((modes, count), np.nan) for name in ("final_q", "final_p")},
     }
-    block = {"rows": np.zeros((room, WIDTH)), "owner": np.zeros(room, np.int64)}
+    block: Columns = {"rows": np.zeros((room, WIDTH)), "owner": np.zeros(room, np.int64)}
     plan = LanesPlan(modes, contacts, impacts, extrema, periods, instructions, impact_limit)
     state = LanesPoints(count=count, rows_room=room, most_seconds=most_seconds)
     given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
