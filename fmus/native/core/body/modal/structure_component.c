@@ -99,15 +99,23 @@ static void check_contact(char *message, int k, const vi_contact *contact)
     }
 }
 
+/* The name is written only where it is needed: inputs are checked in every step. */
+static void check_port_input(char *message, int k, const char *variable, double value)
+{
+    if (!isfinite(value)) {
+        vi_check_finite(message, name_of(k, variable).text, value);
+    }
+}
+
 static void check_inputs(const vi_structure_component *c, char *message)
 {
     vi_check_finite(message, "base_acceleration", c->base_acceleration);
     vi_check_finite(message, "base_acceleration_rate", c->base_acceleration_rate);
     for (int k = 0; k < VI_PORTS; ++k) {
-        vi_check_finite(message, name_of(k, "applied_force").text, c->contacts[k].applied_force);
-        vi_check_finite(message, name_of(k, "applied_stiffness").text, c->contacts[k].applied_stiffness);
-        vi_check_finite(message, name_of(k, "applied_damping").text, c->contacts[k].applied_damping);
-        vi_check_finite(message, name_of(k, "applied_impulse").text, c->contacts[k].applied_impulse);
+        check_port_input(message, k, "applied_force", c->contacts[k].applied_force);
+        check_port_input(message, k, "applied_stiffness", c->contacts[k].applied_stiffness);
+        check_port_input(message, k, "applied_damping", c->contacts[k].applied_damping);
+        check_port_input(message, k, "applied_impulse", c->contacts[k].applied_impulse);
     }
 }
 
