@@ -289,6 +289,17 @@ static bool is_finite(const vi_structure *s)
     return sum <= DBL_MAX;
 }
 
+/* Do the loads have squares? Where a contact's force ends is a root of such. */
+static bool loads_are_finite(const vi_structure *s)
+{
+    double sum = 0.0;
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        const double load = fabs(s->model->mode[j].force) + fabs(s->state->held[j]);
+        sum += load * load;
+    }
+    return sum <= DBL_MAX;
+}
+
 static void begin_step(const vi_structure *s)
 {
     vi_record_begin_step(s->record, vi_structure_observed(s));
@@ -313,10 +324,12 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
         return looked;
     }
     const bool coupled = is_coupled(s);
-    if (coupled) {
+    if (coupled && loads_are_finite(s)) {
         drift(s, target, request);
+    } else if (coupled || !fly(s, target, request)) {
+        return VI_STEP_NOT_FINITE;
     }
-    if ((!coupled && !fly(s, target, request)) || !is_finite(s)) {
+    if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
     vi_structure_settle(s, stops_here(s, target, request));
