@@ -72,12 +72,15 @@ def marked(dataset: xr.Dataset) -> xr.Dataset:
     problems = _problems(dataset)
     if problems:
         raise _refusal(problems)
-    outcome, message = dataset.variables["outcome"].copy(), dataset.variables["message"].copy()
     bad = list(_run_problems(dataset))
+    if not bad:
+        return dataset
+    # a copy for nothing would cost more than all else here
+    outcome, message = dataset.variables["outcome"].copy(), dataset.variables["message"].copy()
     for run, problem in bad:
         outcome.values[run] = Outcome.error
         message.values[run] = "; ".join(text for text in (message.values[run], f"check: {problem}") if text)
-    return dataset.assign(outcome=outcome, message=message) if bad else dataset
+    return dataset.assign(outcome=outcome, message=message)
 
 
 def _refusal(problems: list[str]) -> DatasetError:

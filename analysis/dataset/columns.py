@@ -33,6 +33,13 @@ class Ragged:
         begin, end = int(self.count[:first].sum()), int(self.count[:stop].sum())
         return Ragged(self.count[first:stop], self.rows[begin:end])
 
+    def chosen(self, runs: NDArray[np.int64]) -> Ragged:
+        """Return the rows of some runs, in their order."""
+        count = self.count[runs]
+        begin = (np.cumsum(self.count) - self.count)[runs]
+        rows = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+        return Ragged(count, self.rows[rows])
+
 
 @dataclass(frozen=True, slots=True)
 class RunColumns:
@@ -63,6 +70,16 @@ class RunColumns:
             if isinstance(values, Ragged):
                 return values.taken(first, stop)
             return None if values is None else values[first:stop]
+
+        return RunColumns(*(some(getattr(self, name)) for name in self.__slots__))
+
+    def chosen(self, runs: NDArray[np.int64]) -> RunColumns:
+        """Return some runs, in their order."""
+
+        def some(values: Any) -> Any:
+            if isinstance(values, Ragged):
+                return values.chosen(runs)
+            return None if values is None else values[runs]
 
         return RunColumns(*(some(getattr(self, name)) for name in self.__slots__))
 

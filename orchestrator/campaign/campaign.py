@@ -67,6 +67,7 @@ from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 from vibroimpact.orchestrator.scene.sweep import run_count
 
 MOST_ROUNDS = 3
@@ -187,8 +188,15 @@ class _Campaign:
             str(self._parts_folder),
             runner,
             hashed,
+            execution=self._execution(),
             kept=str(self._kept_path),
         )
+
+    def _execution(self) -> str:
+        """Return how the points run: in lanes or fused, as those of an earlier sweep did; empty: as the scene says."""
+        begun = "" if self._manifest is None else self._manifest.identity.execution
+        either = self._scene.execution.how == "auto" and may_go_by_lanes(self._scene)
+        return begun if either and begun in ("fused", "lanes") else ""
 
     def _checked_manifest(self) -> Manifest | None:
         manifest = read_manifest(self._manifest_path)
@@ -340,7 +348,8 @@ class _Campaign:
         began = time.perf_counter()
         try:
             for stage in stages:
-                schedule = ChunkSchedule(stage.branches, stage.held, self._report.workers)
+                in_lanes = work.identity is not None and work.identity.execution == "lanes"
+                schedule = ChunkSchedule(stage.branches, stage.held, self._report.workers, in_lanes=in_lanes)
                 self._report.runs = stage.runs
                 self._progress.begin(stage.runs, stage.runs - schedule.left, stage.said)
                 own = replace(work, branches=stage.branches) if self._rounds is not None else work

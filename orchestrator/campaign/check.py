@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, BranchPoint, dataset_of, run_point
 from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run.many import loop_of
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import Point, most_points, run_count
+from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
+from vibroimpact.orchestrator.scene.sweep import Point, dimensions, most_points, run_count
 
 MOST_TRIAL_SECONDS = 20.0
 """Wall time after which the trial point is given up, s."""
 LONG_ENOUGH = 0.5
 """A shorter trial is repeated, s: the first call of a process is slower than all that follow."""
-SECONDS_BESIDE = 1e-4
+LANE_TRIALS = 64
+"""Points that are tried together where they run in lanes."""
+GOLDEN = 0.6180339887498949
+"""Its multiples, of its powers likewise, spread over the unit interval: no two axes move together."""
+SECONDS_BESIDE = 3e-5
 """What a point takes beside its own time: handing out, arranging and writing it, s."""
 BYTES_BESIDE = 28_000
 """What a dataset has beside its values: names, attributes, the text of the scene."""
@@ -45,6 +55,8 @@ class Trial:
         Bytes of what was recorded.
     given_up : bool
         Whether it was ended here, and not by a deadline of the scene.
+    lane_seconds : float or None
+        Wall time of one of many points of the sweep that run at once, where they do, s.
     """
 
     values: Mapping[str, float]
@@ -54,6 +66,12 @@ class Trial:
     impacts: int
     size: int
     given_up: bool
+    lane_seconds: float | None = None
+
+    @property
+    def seconds_of_a_point(self) -> float:
+        """Wall time of a point among the others of its sweep, s."""
+        return self.seconds if self.lane_seconds is None else self.lane_seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +107,7 @@ class SceneCost:
         """Return the wall time of all points on so many workers, without their start, s; None when none was tried."""
         if self.trial is None:
             return None
-        return self.points * (self.trial.seconds + SECONDS_BESIDE) / min(workers, self.branches)
+        return self.points * (self.trial.seconds_of_a_point + SECONDS_BESIDE) / min(workers, self.branches)
 
 
 def cost_of(scene: Scene) -> SceneCost:
@@ -146,7 +164,40 @@ def _tried(scene: Scene) -> Trial:
             record = run_point(limited, runner, point, None)
     finally:
         runner.close()
-    return _trial(limited, point, record, given_up=deadline != scene.execution.deadline)
+    trial = _trial(limited, point, record, given_up=deadline != scene.execution.deadline)
+    return replace(trial, lane_seconds=_lane_seconds(scene)) if goes_by_lanes(scene) else trial
+
+
+def _lane_seconds(scene: Scene) -> float:
+    """Return what one of some points, spread over the sweep, takes when they run in lanes, s."""
+    # what finds points their lanes takes time to load, and only these scenes need it
+    from vibroimpact.orchestrator.run.lanes_rows import LaneValues, run_in_lanes
+
+    share = np.arange(LANE_TRIALS)
+    values: dict[str, NDArray[np.float64]] = {}
+    for number, members in enumerate(dimensions(scene.sweep)):
+        place = (share * GOLDEN ** (number + 1) % 1.0 * len(members[0].values)).astype(np.int64)
+        values |= {axis.key: np.array(axis.values)[place] for axis in members}
+    first = np.ones(LANE_TRIALS, dtype=np.bool_)
+
+    def alone(place: int, given: tuple[float, ...] | None) -> RunRecord:
+        return run_point(
+            scene, runner, Point(0, {key: float(each[place]) for key, each in values.items()}), given
+        )
+
+    runner = named_runner(scene, DEFAULT_RUNNER)
+    try:
+        loop = loop_of(scene, runner)
+        assert loop is not None  # its points go by lanes
+        for _ in range(2):  # the first call of a process is slower than all that follow
+            began = time.perf_counter()
+            columns, _ = run_in_lanes(loop, LaneValues(values, first, {}), began + MOST_TRIAL_SECONDS, alone)
+            seconds = time.perf_counter() - began
+            if seconds > LONG_ENOUGH:
+                break
+        return seconds / len(columns)
+    finally:
+        runner.close()
 
 
 def _trial(scene: Scene, point: Point, record: RunRecord, *, given_up: bool) -> Trial:

@@ -61,6 +61,8 @@ class Work:
         Written into each part, so that a stray part of another campaign is noticed.
     identity : RunnerIdentity or None
         What the runner must be; None while the campaign still asks.
+    execution : str
+        How points run where the campaign has begun so; empty: as the scene says.
     kept : str
         File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
     branches : tuple of Branch
@@ -72,6 +74,7 @@ class Work:
     runner: str = DEFAULT_RUNNER
     scene_hash: str = ""
     identity: RunnerIdentity | None = None
+    execution: str = ""
     kept: str = ""
     branches: tuple[Branch, ...] = ()
 
@@ -125,15 +128,15 @@ class ChunkResult:
 
 
 @lru_cache(maxsize=1)
-def _opened(scene: Scene, runner: str) -> tuple[tuple[Branch, ...], Runner, PointLoop | None]:
+def _opened(scene: Scene, runner: str, execution: str) -> tuple[tuple[Branch, ...], Runner, PointLoop | None]:
     """Return the branches of a scene, what runs their points in this process, and the loop in C over them."""
-    opened = named_runner(scene, runner)
+    opened = named_runner(scene, runner, execution or None)
     return expand(scene), opened, loop_of(scene, opened)
 
 
 def get_ready(work: Work) -> RunnerIdentity:
     """Load all that a worker needs before its first chunk, and return which runner it has."""
-    _, runner, _ = _opened(work.scene, work.runner)
+    _, runner, _ = _opened(work.scene, work.runner, work.execution)
     # The first dataset of a process takes long, because libraries load what they need when they need it.
     with ScratchFolder("rehearsal") as folder:
         write_dataset(empty_part(work.scene), Path(folder.name, "rehearsal.nc"))
@@ -148,24 +151,32 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     CampaignError
         When this worker's runner is not the one the campaign began with, or the part cannot be written.
     """
-    branches, runner, loop = _opened(work.scene, work.runner)
+    branches, runner, loop = _opened(work.scene, work.runner, work.execution)
     _refuse_other_runner(work, runner)
     began = time.perf_counter()
     points = _points_left(work, work.branches or branches, chunk)
     if not len(points):
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     deadline = began + chunk.most_seconds
-    ran: tuple[Sequence[RunRecord] | RunColumns, State | None] | None = None
-    if loop is not None:
-        ran = run_in_loop(work.scene, runner, loop, points, chunk.start, deadline)
-    if ran is None:
-        ran = run_points(work.scene, runner, points.places(), chunk.start, deadline)
-    records, carried = ran
+    records, carried = run_columns(work.scene, runner, loop, points, chunk.start, deadline)
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
     done = replace(chunk, stop=stop)
     outcomes = write_part(work, done, points.taken(len(records)), records, carried)
     return ChunkResult(done, carried, outcomes, seconds)
+
+
+def run_columns(
+    scene: Scene,
+    runner: Runner,
+    loop: PointLoop | None,
+    points: PointColumns,
+    start: State | None,
+    deadline: float,
+) -> tuple[Sequence[RunRecord] | RunColumns, State | None]:
+    """Run points in the quickest way that they allow, see `run_points`."""
+    ran = None if loop is None else run_in_loop(scene, runner, loop, points, start, deadline)
+    return run_points(scene, runner, points.places(), start, deadline) if ran is None else ran
 
 
 def run_in_loop(
@@ -176,7 +187,12 @@ def run_in_loop(
     start: State | None,
     deadline: float = math.inf,
 ) -> tuple[RunColumns, State | None] | None:
-    """Run points by the loop in C, with the results of `run_points`; None where they need Python in between."""
+    """Run points by the loop in C or in lanes; None where they need Python in between.
+
+    The loop has the results of `run_points`, lanes have them to rounding.
+    """
+    if loop.by_lanes:
+        return _run_in_lanes(scene, runner, loop, points, start, deadline)
     prepared = None if points.starts else loop.prepared(PointValues(points.values, points.first))
     if prepared is None:
         return None
@@ -188,12 +204,28 @@ def run_in_loop(
     return run_loop(loop, prepared, start, deadline, alone)
 
 
+def _run_in_lanes(
+    scene: Scene, runner: Runner, loop: PointLoop, points: PointColumns, start: State | None, deadline: float
+) -> tuple[RunColumns, State | None]:
+    # what finds points their lanes takes time to load, and only these scenes need it
+    from vibroimpact.orchestrator.run.lanes_rows import LaneValues, run_in_lanes
+
+    begins = np.isin(points.index, list(points.starts)) & points.first
+    starts = {int(place): points.starts[int(points.index[place])] for place in np.flatnonzero(begins)}
+    whole = LaneValues(points.values, points.first, starts).piece(0, len(points), start)
+
+    def alone(place: int, given: State | None) -> RunRecord:
+        return run_point(scene, runner, points.place(place).point, given)
+
+    return run_in_lanes(loop, whole, deadline, alone)
+
+
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
     """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
-    branches, runner, _ = _opened(work.scene, work.runner)
+    branches, runner, loop = _opened(work.scene, work.runner, work.execution)
     _refuse_other_runner(work, runner)
-    points = points_of(branches, chunk)
-    records, _ = run_points(work.scene, runner, points, chunk.start)
+    points = columns_of_points(branches, chunk)
+    records, _ = run_columns(work.scene, runner, loop, points, chunk.start, math.inf)
     return dataset_of(work.scene, points, records, {})
 
 
@@ -280,6 +312,8 @@ def columns_of_points(branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
         if begin >= chunk.stop:
             break
         first, stop = max(chunk.first - begin, 0), min(chunk.stop - begin, len(branch.points))
+        if first >= stop:
+            continue
         index = np.arange(begin + first, begin + stop)
         direction = np.full(len(index), Direction[branch.direction], dtype=np.int8)
         starts = {} if branch.start is None else {begin: branch.start}

@@ -17,7 +17,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.provenance import git_commit, provenance, versions
-from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 FORMAT = 2
@@ -202,7 +202,12 @@ def _checked(content: dict[str, Any]) -> Manifest:
         content_hash = _hash_of(content)
     if recorded != content_hash:
         raise ValueError("its content is not the one whose SHA-256 it has")
-    identity = RunnerIdentity(content["execution"], content["instruction_set"], dict(content["fmu_hashes"]))
+    identity = RunnerIdentity(
+        content["execution"],
+        content["instruction_set"],
+        dict(content["fmu_hashes"]),
+        int(content.get("engine", OTHER_ENGINE)),
+    )
     return Manifest(
         dict(content["scene"]),
         content["scene_hash"],

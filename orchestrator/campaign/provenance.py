@@ -29,7 +29,8 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "git_commit": git_commit(),
         "seed": _seed(scene),
         "execution": identity.execution,
-        "engine": in_one_line(scene),
+        "engine": in_one_line(scene, identity.execution),
+        "engine_version": identity.engine,
         "instruction_set": identity.instruction_set,
         **scene.found,
     }

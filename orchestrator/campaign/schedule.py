@@ -7,7 +7,8 @@ turns out much longer than planned ends early, and what is left of it is handed 
 Runs are cut in whole *units*: a single independent run, or a whole branch of a continuation sweep. Towards
 the end the chunks get shorter, so that all workers finish together (guided self-scheduling). A branch that
 takes longer than a chunk becomes a *strand*: its next chunk exists only when the one before has ended,
-and strands run side by side.
+and strands run side by side. Branches that run side by side in one chunk, in lanes, are handed out together however
+long they take: one alone would take as long as all of them.
 """
 
 from __future__ import annotations
@@ -39,6 +40,10 @@ MOST_POINTS = 20_000
 LOST_PIECES = 16
 """Into how many pieces a chunk is cut when it killed its worker, to find the point that does it."""
 
+BRANCHES_IN_LANES, FEWEST_IN_LANES = 32, 8
+"""Branches that a chunk should have at least where they run in lanes, so that few lanes wait for the longest branch;
+and at least where not many are left for each worker, lest lanes are empty."""
+
 QUEUED_PER_WORKER = 3
 """Chunks handed out for each worker: one that runs, the rest so that it never waits for the next."""
 
@@ -69,10 +74,15 @@ class _Strand:
 
 
 class ChunkSchedule:
-    """Cuts what is left of a campaign into chunks for a number of workers; branches and parts are in run order."""
+    """Cuts what is left of a campaign into chunks for a number of workers; branches and parts are in run order.
 
-    def __init__(self, branches: Sequence[Branch], parts: Sequence[StoredPart], workers: int) -> None:
-        self._workers = workers
+    `in_lanes`: branches of one chunk run side by side.
+    """
+
+    def __init__(
+        self, branches: Sequence[Branch], parts: Sequence[StoredPart], workers: int, *, in_lanes: bool = False
+    ) -> None:
+        self._workers, self._in_lanes = workers, in_lanes
         self._first_runs = [branch.points.first_index for branch in branches]
         self._chained = branches[0].direction != "independent"
         self._unit = len(branches[0].points) if self._chained else 1
@@ -168,7 +178,7 @@ class ChunkSchedule:
     def _cut_units(self) -> Chunk:
         gap = self._units[0]
         seconds = self._fair_seconds()
-        points = min(_points_in(seconds, self._pace), gap.most)
+        points = max(min(_points_in(seconds, self._pace), gap.most), self._points_beside(gap))
         taken = gap.take(max(points // self._unit, 1) * self._unit)
         if gap.first == gap.stop:
             self._units.popleft()
@@ -177,6 +187,14 @@ class ChunkSchedule:
             strand = self._begun[branch] = _Strand(branch, deque([taken]), self._pace)
             return self._cut_strand(strand)
         return self._hand_out(branch, taken, seconds)
+
+    def _points_beside(self, gap: Gap) -> int:
+        """Return how many points a chunk has at least for its branches to run side by side; 0 where they do not."""
+        if not (self._chained and self._in_lanes) or gap.most < MOST_POINTS:
+            return 0
+        share = -(-(gap.stop - gap.first) // (self._unit * self._workers))
+        beside = min(BRANCHES_IN_LANES, max(share, FEWEST_IN_LANES))
+        return min(beside, MOST_POINTS // self._unit) * self._unit
 
     def _fair_seconds(self) -> float:
         """Return how long the next chunk of units should take: half of a worker's share of the rest."""

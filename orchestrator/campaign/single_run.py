@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
 from vibroimpact.analysis.dataset import RunRecord, write_dataset
+from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.chunks import (
     DEFAULT_RUNNER,
-    BranchPoint,
     Chunk,
+    PointColumns,
+    columns_of_points,
     dataset_of,
     empty_part,
-    points_of,
+    run_columns,
     run_points,
     tally,
 )
@@ -23,9 +26,13 @@ from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.provenance import provenance
 from vibroimpact.orchestrator.run import Runner, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
+from vibroimpact.orchestrator.run.many import PointLoop, loop_of
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, most_points, run_count
+
+PROGRESS_SECONDS = 0.5
+"""Time after which progress is told of the points that are done, s."""
 
 
 def run_scene(
@@ -65,7 +72,7 @@ def run_scene(
     try:
         # A dataset that cannot be made is found out before an hour of work, not after it.
         with_constants_of(empty_part(scene), scene)
-        points = points_of(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
+        points = columns_of_points(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
         records = _run_all(scene, opened, points, progress or Progress())
         dataset = dataset_of(scene, points, records, provenance(scene, identity_of(opened)))
         dataset = with_constants_of(dataset, scene)
@@ -93,17 +100,37 @@ def refuse_adaptive(scene: Scene) -> None:
         )
 
 
-def _run_all(scene: Scene, runner: Runner, points: list[BranchPoint], progress: Progress) -> list[RunRecord]:
+def _run_all(
+    scene: Scene, runner: Runner, points: PointColumns, progress: Progress
+) -> list[RunRecord] | RunColumns:
     if len(points) > 1:
         progress.begin(len(points), 0)
+    if scene.sweep and (loop := loop_of(scene, runner)) is not None:
+        return _run_in_loop(scene, runner, loop, points, progress)
     records: list[RunRecord] = []
     carried = None
-    for place in points:
+    for place in points.places():
         done, carried = run_points(scene, runner, [place], carried)
         records += done
         if len(points) > 1:
             progress.advance(1)
     return records
+
+
+def _run_in_loop(
+    scene: Scene, runner: Runner, loop: PointLoop, points: PointColumns, progress: Progress
+) -> list[RunRecord] | RunColumns:
+    """Run points as a campaign does; now and then progress is told."""
+    pieces: list[RunColumns] = []
+    done, carried = 0, None
+    while done < len(points):
+        until = time.perf_counter() + PROGRESS_SECONDS
+        left = points.chosen(slice(done, None))
+        columns, carried = run_columns(scene, runner, loop, left, carried, until)
+        pieces.append(columns if isinstance(columns, RunColumns) else columns_of(columns))
+        done += len(columns)
+        progress.advance(len(columns))
+    return joined(pieces)
 
 
 def _refuse_unwritable(target: Path) -> None:

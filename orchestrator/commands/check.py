@@ -14,6 +14,7 @@ from vibroimpact.orchestrator.campaign.check import (
     BYTES_BESIDE,
     COPIES_IN_CAMPAIGN,
     COPIES_IN_RUN,
+    LANE_TRIALS,
     MOST_TRIAL_SECONDS,
     Trial,
 )
@@ -115,6 +116,10 @@ def _trial(trial: Trial) -> str:
         said = " ".join(trial.message.split())
         return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {said}"
     alike = "; what follows takes all points to be like it" if at else ""
+    if trial.lane_seconds is not None:
+        alike = (
+            f"; {duration(trial.lane_seconds)} each of {LANE_TRIALS} at once, of which follows what all take"
+        )
     return f"{where}{duration(trial.seconds)}, {counted(trial.impacts, 'impact')}, {size(trial.size)} of results{alike}"
 
 

@@ -83,6 +83,7 @@ class GuardedRunner:
         self.execution = identity.execution
         self.instruction_set = identity.instruction_set
         self.fmu_hashes = dict(identity.fmu_hashes)
+        self.engine = identity.engine
         deadline = scene.execution.deadline
         self._deadline = DEFAULT_DEADLINE if deadline is None else deadline
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody
-from vibroimpact.fmus.core.modes import Boundary, ChainModes, beam_modes, chain_modes
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run.modal import mass_of_beam, modes_of_chain, row_of, structure_of
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
@@ -105,18 +105,6 @@ def _oscillator(scene: Scene, numbers: dict[str, float]) -> ImpactingBody:
     )
 
 
-def _row(numbers: dict[str, float], name: str, count: int) -> Floats:
-    return np.array([numbers.get(f"{name}[{i}]", 0.0) for i in range(1, count + 1)])
-
-
-def _modes_of_chain(numbers: dict[str, float], masses: int) -> ChainModes:
-    return chain_modes(
-        _row(numbers, "mass", masses),
-        np.append(_row(numbers, "stiffness", masses), numbers["far_stiffness"]),
-        np.append(_row(numbers, "damping", masses), numbers["far_damping"]),
-    )
-
-
 def modal_displacements(scene: Scene, displacements: Floats) -> Floats:
     """Return displacements of the masses of a chain, or of the modes of a beam, in mass-normalised modes.
 
@@ -136,22 +124,17 @@ def modal_displacements(scene: Scene, displacements: Floats) -> Floats:
     if isinstance(scene.body, ChainBody):
         masses = integers["masses"]
         kept = integers["modes"] or masses
-        shapes = _modes_of_chain(numbers, masses).shapes[:, :kept]
-        found = (displacements * _row(numbers, "mass", masses)) @ shapes
+        shapes = modes_of_chain(numbers, masses).shapes[:, :kept]
+        found = (displacements * row_of(numbers, "mass", masses)) @ shapes
     elif isinstance(scene.body, BeamBody):
-        density = (
-            numbers.get("mass_per_length") or numbers["density"] * numbers["width"] * numbers["thickness"]
-        )
-        found = displacements * np.sqrt(density * numbers["length"])
+        found = displacements * np.sqrt(mass_of_beam(numbers))
     else:
         found = displacements * np.sqrt(numbers["mass"])
     return found
 
 
 def _chain(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) -> ImpactingBody:
-    masses = integers["masses"]
-    modes = _modes_of_chain(numbers, masses)
-    kept = integers["modes"] or masses
+    modes = modes_of_chain(numbers, integers["masses"])
     if not modes.is_classical:
         raise UsageError(
             f"{scene.source}: body.dampings: expected damping that does not couple the modes where orbits are "
@@ -161,18 +144,7 @@ def _chain(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) ->
         raise UsageError(
             f"{scene.source}: body.stiffnesses: expected a chain tied to the ground, got one that is loose."
         )
-    shape = modes.shapes[:, :kept]
-    held = np.zeros(masses)
-    hit = [shape[integers[f"contact[{k}].mass_number"] - 1] for k in range(1, len(scene.stops) + 1)]
-    return ImpactingBody(
-        modes.frequencies[:kept],
-        modes.damping_ratios[:kept],
-        _row(numbers, "forcing.amplitude", masses) @ shape,
-        held @ shape,
-        *_harmonic(numbers),
-        tuple(_contacts(scene, numbers, integers, hit)),
-        shape[integers["observed_mass"] - 1],
-    )
+    return _structure(scene, numbers, integers)
 
 
 def _beam(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) -> ImpactingBody:
@@ -182,33 +154,22 @@ def _beam(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) -> 
             f'{scene.source}: body.impact_projection: expected "variational" where orbits are followed, '
             f'got "{body.impact_projection}".'
         )
-    count, length = integers["modes"], numbers["length"]
-    area_moment = numbers.get("width", 0.0) * numbers.get("thickness", 0.0) ** 3 / 12.0
-    rigidity = numbers.get("flexural_rigidity") or numbers["youngs_modulus"] * area_moment
-    density = numbers.get("mass_per_length") or numbers["density"] * numbers["width"] * numbers["thickness"]
-    modes = beam_modes(cast("Boundary", body.boundary.replace("-", "_")), count)
-    natural = modes.eigenvalues**2 * (np.sqrt(rigidity / density) / length**2)
-    root = np.sqrt(density * length)
-    ratios = _row(numbers, "damping_ratio", count) + 0.5 * (
-        numbers.get("rayleigh.mass", 0.0) / natural + numbers.get("rayleigh.stiffness", 0.0) * natural
-    )
-    places = [numbers["forcing_location"], numbers["sensor_location"]]
-    places += [numbers[f"contact[{k}].location"] for k in range(1, len(scene.stops) + 1)]
-    shapes = modes.shapes(places) / root
-    amplitude = numbers["forcing.amplitude"]
-    assert scene.forcing is not None
-    force = {
-        "force": amplitude * shapes[0],
-        "uniform": amplitude * length * modes.participation / root,
-        "mode": amplitude / root * (np.arange(1, count + 1) == integers.get("forcing.mode", 0)),
-        "base_acceleration": -amplitude * root * modes.participation,
-    }[scene.forcing.kind]
+    return _structure(scene, numbers, integers)
+
+
+def _structure(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) -> ImpactingBody:
+    found = structure_of(scene, numbers, integers)
+    assert found is not None  # a chain that has none is refused
+    root = np.sqrt(found.mass)
+    amplitudes = row_of(numbers, "forcing.amplitude", found.load.shape[1])
+    if "forcing.amplitude" in numbers:
+        amplitudes = np.array([numbers["forcing.amplitude"]])
     return ImpactingBody(
-        natural,
-        ratios,
-        force,
-        numbers.get("force", 0.0) * shapes[0],
+        found.frequencies,
+        found.damping_ratios,
+        found.load @ amplitudes * root,
+        numbers.get("force", 0.0) * found.held * root,
         *_harmonic(numbers),
-        tuple(_contacts(scene, numbers, integers, list(shapes[2:]))),
-        shapes[1],
+        tuple(_contacts(scene, numbers, integers, list(found.contacts / root))),
+        found.observed / root,
     )

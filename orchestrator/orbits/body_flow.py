@@ -11,18 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns, joined
 from vibroimpact.analysis.orbits.basins import Ends, Floats
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.lanes_rows import run_prepared_in_lanes
 from vibroimpact.orchestrator.run.many import PointLoop, PointValues, PreparedPoints, loop_of
 from vibroimpact.orchestrator.run.many_rows import run_loop
 from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 
 RECORDED = 64
 """Forcing periods of which the class of a run is told."""
@@ -45,7 +47,7 @@ class _Closing(Exception):
 
 
 class BodyFlow:
-    """Follows many states of a scene's body by the loop in C, on two threads and more."""
+    """Follows many states of a scene's body in lanes, or by the loop in C, on two threads and more."""
 
     def __init__(self, scene: Scene, workers: int | None = None) -> None:
         self.scene = scene
@@ -62,7 +64,8 @@ class BodyFlow:
     def _loop(self, record: dict[str, Any]) -> PointLoop:
         limits = {"execution.how": "auto", "execution.deadline": DEADLINE}
         scene = self.scene.with_values({"record": record, **limits})
-        self._runners.append(PointRunner(scene))
+        by_lanes = self.scene.execution.how == "auto" and may_go_by_lanes(scene)
+        self._runners.append(PointRunner(scene, execution="lanes" if by_lanes else "fused"))
         loop = loop_of(scene, self._runners[-1])
         if loop is None:
             raise UsageError(
@@ -105,15 +108,20 @@ class BodyFlow:
         return [job.result() for job in jobs]
 
     def _run_part(self, loop: PointLoop, states: Floats, periods: tuple[int, int], first: bool) -> RunColumns:
-        def alone(place: int, _: object) -> tuple[Any, None]:
+        def refused(place: int, _: object) -> tuple[RunRecord, None]:
             return empty_record(loop.scene, Outcome.error, "refused", 0.0), None
 
         done: list[RunColumns] = []
         while len(states):
             if self._closing:
                 raise _Closing
-            points = self._prepared(loop, states, periods, first=first)
-            done.append(run_loop(loop, points, None, time.perf_counter() + SLICE, alone)[0])
+            points, over = self._prepared(loop, states, periods, first=first), time.perf_counter() + SLICE
+            if loop.by_lanes:
+                done.append(
+                    run_prepared_in_lanes(loop, points, over, lambda place, _: refused(place, None)[0])
+                )
+            else:
+                done.append(run_loop(loop, points, None, over, refused)[0])
             states = states[len(done[-1]) :]
         return joined(done)
 

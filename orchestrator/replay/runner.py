@@ -22,7 +22,7 @@ from vibroimpact.orchestrator.replay.replayer import (
 )
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.run.parameters import most_elements, padded_state
-from vibroimpact.orchestrator.run.point import built_for
+from vibroimpact.orchestrator.run.point import ENGINE, built_for
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
@@ -39,11 +39,13 @@ class ReplayRunner:
 
     Attributes
     ----------
-    execution, instruction_set
+    execution, engine, instruction_set
         As of `runner.PointRunner`.
     fmu_hashes : dict of str to str
         SHA-256 of each component's FMU and of each recording: a campaign never mixes two versions of either.
     """
+
+    engine = ENGINE
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self.execution = "fused" if execution == "auto" else execution

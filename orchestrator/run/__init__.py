@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.opening import (
+    OTHER_ENGINE,
     AnnouncedRunner,
     Runner,
     RunnerIdentity,
@@ -15,6 +16,7 @@ from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.run.session import Session
 
 __all__ = [
+    "OTHER_ENGINE",
     "AnnouncedRunner",
     "GeneralRunner",
     "PointRunner",

@@ -7,7 +7,7 @@ in between, for a time series or an importer, have no such loop: `loop_of` retur
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,8 +75,9 @@ class PreparedPoints:
 
 def loop_of(scene: Scene, runner: Runner) -> PointLoop | None:
     """Return the loop in C over points of a scene; None where they need Python in between."""
-    if not isinstance(runner, PointRunner) or runner.execution != "fused":
+    if not isinstance(runner, PointRunner) or runner.execution not in ("fused", "lanes"):
         return None
+    by_lanes = runner.execution == "lanes"
     driver = runner.driver
     deadline, chained = scene.execution.deadline, any(axis.continuation for axis in scene.sweep)
     if (
@@ -85,17 +86,17 @@ def loop_of(scene: Scene, runner: Runner) -> PointLoop | None:
         or scene.is_measured
         or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
         or (deadline is not None and deadline < SHORTEST_DEADLINE)
-        or (chained and not isinstance(scene.body, OscillatorBody))
+        or (chained and not (by_lanes or isinstance(scene.body, OscillatorBody)))
     ):
         return None
-    return PointLoop(scene, driver)
+    return PointLoop(scene, driver, by_lanes=by_lanes)
 
 
 class PointLoop:
-    """Runs points of a scene on the instance of a runner, see `loop_of`."""
+    """Runs points of a scene on the instance of a runner, see `loop_of`; `by_lanes`: those that lanes leave."""
 
-    def __init__(self, scene: Scene, driver: BodyDriver) -> None:
-        self.scene, self.driver = scene, driver
+    def __init__(self, scene: Scene, driver: BodyDriver, *, by_lanes: bool = False) -> None:
+        self.scene, self.driver, self.by_lanes = scene, driver, by_lanes
         ports = [f"contact[{k}]" for k in range(1, len(scene.stops) + 1)]
         self._stuck = tuple(f"{port}.stuck" for port in ports)
         finals = (*OBSERVED, *state_variables(scene), *(f"{port}.stick_start" for port in ports))
@@ -196,18 +197,26 @@ class PointLoop:
         """Return the parameters of each point, shape (point, parameter), in the order of the driver."""
         names = self.driver.float_names
         table = np.empty((len(points), len(names)))
-        if isinstance(self.scene.body, BeamBody):
-            # powers of numbers and of arrays may differ in their last bit
-            for place in range(len(points)):
-                at = {key: float(values[place]) for key, values in points.values.items()}
-                found = float_parameters(self.scene.at(at), None)
-                table[place] = [found[name] for name in names]
-            return table
-        columns: Mapping[str, Any] = points.values
-        found = float_parameters(self.scene.at(columns), None)
-        for column, name in enumerate(names):
-            table[:, column] = found[name]
+        for chosen, values in self._alike(points):
+            found = float_parameters(self.scene.at(values), None)
+            for column, name in enumerate(names):
+                table[chosen, column] = found[name]
         return table
+
+    def _alike(self, points: PointValues) -> Iterator[tuple[NDArray[np.intp] | slice, Mapping[str, Any]]]:
+        """Yield points whose parameters are found together, and their values.
+
+        Of a beam those of one body: powers of numbers and of arrays, in its rigidity, may differ in their last bit.
+        """
+        own = [key for key in points.values if key.startswith("body.")]
+        if not (own and isinstance(self.scene.body, BeamBody)):
+            yield slice(None), points.values
+            return
+        bodies, which = np.unique([points.values[key] for key in own], axis=1, return_inverse=True)
+        for number, body in enumerate(bodies.T):
+            chosen = np.flatnonzero(which.reshape(-1) == number)
+            others = {key: values[chosen] for key, values in points.values.items() if key not in own}
+            yield chosen, others | dict(zip(own, body.tolist(), strict=True))
 
 
 def _place(name: str, names: Sequence[str]) -> int:

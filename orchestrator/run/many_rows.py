@@ -175,8 +175,10 @@ class _Loop:
             final_velocity=finals[:, 1],
             final_phase=self._final_phase(outcome, arrays["reached"]),
             final_state=finals[:, len(OBSERVED) : len(OBSERVED) + elements] if elements else None,
-            periods=_periods(rows, owner, done) if self._points.periods else None,
-            impacts=_ragged(rows, owner, done, ROW_IMPACT, len(IMPACT_COLUMNS)) if record.impacts else None,
+            periods=period_table(rows, owner, done) if self._points.periods else None,
+            impacts=ragged_rows(rows, owner, done, ROW_IMPACT, len(IMPACT_COLUMNS))
+            if record.impacts
+            else None,
             sticks=self._sticks(rows, owner, arrays) if record.impacts else None,
         )
 
@@ -228,10 +230,10 @@ class _Loop:
         if not self._points.forced:
             return np.full(len(outcome), np.nan)
         names, table = self._loop.driver.float_names, self._points.table[: len(outcome)]
-        phase = table[:, names.index("forcing.phase")]
-        angle = table[:, names.index("forcing.angular_frequency")] * reached
-        came_to_end = (outcome == Outcome.ok) | (outcome == Outcome.stuck)
-        return np.where(came_to_end, 0.0, (angle + phase) % TWO_PI)
+        frequency, phase = (
+            table[:, names.index(f"forcing.{name}")] for name in ("angular_frequency", "phase")
+        )
+        return final_phases(outcome, reached, frequency, phase)
 
     def _sticks(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
         """Return the sticks of each point, those that have not ended among them."""
@@ -244,10 +246,18 @@ class _Loop:
         owners = np.concatenate([owner[ended], run])
         order = np.argsort(owners, kind="stable")
         together = np.concatenate([rows[ended], still])[order]
-        return _ragged(together, owners[order], done, ROW_STICK, len(STICK_COLUMNS))
+        return ragged_rows(together, owners[order], done, ROW_STICK, len(STICK_COLUMNS))
 
 
-def _periods(rows: Floats, owner: Ints, done: int) -> Floats:
+def final_phases(
+    outcome: NDArray[np.int8], reached: Floats, angular_frequency: Floats, phase: Floats
+) -> Floats:
+    """Return the phase of the force where each run ended, rad: at 0 but where a limit ended it."""
+    came_to_end = (outcome == Outcome.ok) | (outcome == Outcome.stuck)
+    return np.where(came_to_end, 0.0, (angular_frequency * reached + phase) % TWO_PI)
+
+
+def period_table(rows: Floats, owner: Ints, done: int) -> Floats:
     """Return the table of periods, shape (run, period, 5); runs with fewer than others end in NaN."""
     chosen = rows[:, 0] == ROW_PERIOD
     owner = owner[chosen]
@@ -258,7 +268,7 @@ def _periods(rows: Floats, owner: Ints, done: int) -> Floats:
     return table
 
 
-def _ragged(rows: Floats, owner: Ints, done: int, kind: float, columns: int) -> Ragged:
+def ragged_rows(rows: Floats, owner: Ints, done: int, kind: float, columns: int) -> Ragged:
     """Return the rows of a kind, those of each run in the order of their time."""
     chosen = rows[:, 0] == kind
     found, owner = rows[chosen, 1 : 1 + columns], owner[chosen]

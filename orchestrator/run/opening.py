@@ -13,6 +13,9 @@ from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
+OTHER_ENGINE = 1
+"""Version of the engine of components that are not ours, and of bodies before there was a number."""
+
 REPLAY_RUNNER = "vibroimpact.orchestrator.replay.runner:ReplayRunner"
 """Replays are a floor above: named here, loaded by those who replay."""
 
@@ -24,11 +27,13 @@ class RunnerIdentity:
     execution: str
     instruction_set: str
     fmu_hashes: Mapping[str, str]
+    engine: int = OTHER_ENGINE
 
 
 def identity_of(runner: Runner) -> RunnerIdentity:
-    """Return what a runner is: its execution, instruction set and FMU hashes."""
-    return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
+    """Return what a runner is: its execution, instruction set, FMU hashes and version of the engine."""
+    engine = getattr(runner, "engine", OTHER_ENGINE)
+    return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes), engine)
 
 
 class Runner(Protocol):

@@ -41,10 +41,14 @@ from vibroimpact.orchestrator.run.record import (
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 from vibroimpact.orchestrator.scene.models import Record
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measured_run import MeasuredRun
+
+ENGINE = 2
+"""Version of what follows our bodies, in C; with another one results differ, and no campaign mixes two."""
 
 TWO_PI = 2.0 * math.pi
 Numbers = TypeVar("Numbers", float, NDArray[np.float64])
@@ -58,14 +62,16 @@ class PointRunner:
     scene : Scene
         The scene; swept keys take their values from each point.
     execution : str
-        `fused`, `coupled`, or `auto`, which takes `fused`.
+        `fused`, `coupled`, or `auto`, which takes `lanes` for the points of a sweep that can go so, else `fused`.
     wrap : callable or None
         Given a component's name: what wraps the functions of its FMU.
 
     Attributes
     ----------
     execution : str
-        What runs: `fused` or `coupled`.
+        What runs: `fused`, `coupled`, or `lanes`, which run many points at once (`lanes_rows`); a single one is fused.
+    engine : int
+        Version of what follows the body.
     instruction_set : str
         Machine architecture the components are compiled for.
     fmu_hashes : dict of str to str
@@ -74,8 +80,11 @@ class PointRunner:
         What drives the body.
     """
 
+    engine = ENGINE
+
     def __init__(self, scene: Scene, *, execution: str = "auto", wrap: WrapOf | None = None) -> None:
-        self.execution = "fused" if execution == "auto" else execution
+        chosen = "lanes" if goes_by_lanes(scene) else "fused"
+        self.execution = chosen if execution == "auto" else execution
         self.instruction_set = platform.machine()
         self._scene, self._wrap = scene, wrap
         self._plan = TimeSeriesPlan(scene)
@@ -145,7 +154,7 @@ def driver_of(
     """Return what drives a scene's body: fused, or coupled to its stops and to other components."""
     floats, integers = float_parameters(scene, None), integer_parameters(scene)
     fmu = FMU_NAMES[scene.body.kind]
-    if execution == "fused":
+    if execution in ("fused", "lanes"):
         return BodyDriver(floats, integers, fmu, wrap=wrap)
     if execution == "coupled":
         step = scene.execution.macro_step

@@ -327,8 +327,9 @@ class Execution(SceneTable):
         Literal["auto", "coupled", "fused"],
         Rule(
             unavailable=("batch",),
-            doc='`"auto"`; `"fused"`: the contact law runs inside the body; `"coupled"`: each component is an FMU of '
-            "its own and the importer finds the events between them",
+            doc='`"auto"`: `"fused"`, and where a sweep allows it many points at once, in lanes, see '
+            '[below](#many-points-at-once); `"fused"`: the contact law runs inside the body; `"coupled"`: each '
+            "component is an FMU of its own and the importer finds the events between them",
         ),
     ] = "auto"
     impact_limit: Annotated[
@@ -344,7 +345,7 @@ class Execution(SceneTable):
             unit="s",
             sweepable=False,
             doc="wall time per point, then its outcome is timeout; looked at every few hundredths of a second, within "
-            "a long step too",
+            "a long step too; with one points do not run in lanes, where none has a clock of its own",
         ),
     ] = None
     macro_step: Annotated[

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
-from vibroimpact.orchestrator.scene.fields import rule_of
+from vibroimpact.orchestrator.scene.called import called_by_numbers
 from vibroimpact.orchestrator.scene.keys import MODES
+from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
-from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 from vibroimpact.orchestrator.scene.scene import Scene
 
 
-def engine(scene: Scene) -> str:
-    """Return what follows the motion.
+def engine(scene: Scene, execution: str = "auto") -> str:
+    """Return what follows the motion: as the scene says, or as a campaign runs it (`fused`, `lanes`, ...).
 
     Examples
     --------
@@ -31,7 +31,8 @@ def engine(scene: Scene) -> str:
         return f"replay from sample to sample: {_body(scene)}"
     if scene.execution.how == "coupled":
         return f"coupled: {_body(scene)}{'; an ImpactStop for each stop' if scene.stops else ''}"
-    return f"fused: {_body(scene)}"
+    by_lanes = goes_by_lanes(scene) if execution == "auto" else execution == "lanes"
+    return f"{'lanes, many points at once' if by_lanes else 'fused'}: {_body(scene)}"
 
 
 def _body(scene: Scene) -> str:
@@ -83,7 +84,7 @@ def effects(scene: Scene) -> dict[str, bool]:
             "watched events": bool(scene.general.events),
         }
         return found | common
-    called, series = _called_by_numbers(scene), scene.record.time_series
+    called, series = called_by_numbers(scene), scene.record.time_series
     followed = not isinstance(scene.body, OscillatorBody) and series is not None
     return {
         "forcing": scene.forcing is not None,
@@ -121,20 +122,8 @@ def _samples(scene: Scene) -> bool:
     return scene.record.time_series is not None
 
 
-def _largest(scene: Scene) -> dict[str, float]:
-    """Return the largest magnitude that each number of a scene has over its sweep, by key."""
-    numbers = [axis for axis in scene.sweep if axis.key != RECORDING_KEY]
-    swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in numbers}
-    return {key: abs(number) for key, number in scene.constants().items()} | swept
-
-
-def _called_by_numbers(scene: Scene) -> set[str]:
-    """Return the effects that numbers other than 0 call for."""
-    return {rule_of(scene.field(key)).effect for key, largest in _largest(scene).items() if largest > 0.0}
-
-
-def in_one_line(scene: Scene) -> str:
+def in_one_line(scene: Scene, execution: str = "auto") -> str:
     """Return engine, laws and effects as one line."""
     stops = [f"{key} {what}" for key, what in (laws(scene) | contacts(scene)).items()]
     called = [name for name, there in effects(scene).items() if there and name not in ("stops", "contacts")]
-    return "; ".join(part for part in (engine(scene), ", ".join(stops), ", ".join(called)) if part)
+    return "; ".join(part for part in (engine(scene, execution), ", ".join(stops), ", ".join(called)) if part)

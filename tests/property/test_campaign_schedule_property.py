@@ -47,16 +47,17 @@ def some_parts(data: st.DataObject, branches: tuple[Branch, ...], runs: int) -> 
     path=paths,
     others=st.integers(1, 12),
     workers=st.integers(1, 4),
+    in_lanes=st.booleans(),
 )
 def test_every_run_is_computed_once_and_starts_where_the_one_before_ended(
-    data: st.DataObject, points: int, path: SweepPath, others: int, workers: int
+    data: st.DataObject, points: int, path: SweepPath, others: int, workers: int, in_lanes: bool
 ) -> None:
     branches = sweep(points, path, others)
     runs = sum(len(branch.points) for branch in branches)
     begins = {branch.points.first_index for branch in branches}
     parts = some_parts(data, branches, runs)
     covered = [run for part in parts for run in range(part.chunk.first, part.chunk.stop)]
-    schedule = ChunkSchedule(branches, parts, workers)
+    schedule = ChunkSchedule(branches, parts, workers, in_lanes=in_lanes)
     seconds = data.draw(st.sampled_from([1e-5, 1e-3, 0.04, 3.0]))
     in_flight: list[Chunk] = []
     while True:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from support.drawn_oscillators import FORCED, LAWS, MOST_IMPACTS, OSCILLATOR, oscillators
 
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS
 from vibroimpact.orchestrator.campaign.chunks import (
@@ -21,64 +21,7 @@ from vibroimpact.orchestrator.run.many import loop_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
-MOST_IMPACTS = 300
-"""Of one point: many of the drawn scenes come to it."""
-
-OSCILLATOR = """
-[body]
-mass = {mass}
-stiffness = {stiffness}
-{damping}
-displacement_start = {displacement}
-{forcing}
-[[stop]]
-position = 1.0
-{law}
-{second}
-[record]
-{record}
-[execution]
-impact_limit = {limit}
-[sweep]
-{sweep}
-"""
-LAWS = ("restitution = 0.7", "restitution = 0.0", 'law = "kelvin_voigt"\nstiffness = 50.0\ndamping = 0.5')
-SECOND = ("", '[[stop]]\nposition = -1.5\nside = "lower"\nrestitution = 0.9')
-FORCED = (
-    "transient_periods = 2\nrecorded_periods = 3",
-    "recorded_periods = 2\nextrema = false\nimpacts = false",
-)
-FREE = ("transient_time = 1.0\nrecorded_time = 9.0", "recorded_time = 5.0\nimpacts = false")
-SWEPT = ("body.mass", "stop[1].position", "body.velocity_start")
-STARTS = ("body.velocity_start", "forcing.phase")
-"""Keys along which no branch goes."""
-SWEPT_FORCED = (*SWEPT, "forcing.amplitude", "forcing.phase")
-
-
-@st.composite
-def scenes(draw: st.DrawFn) -> str:
-    """Draw an oscillator with one or two stops, forced, pressed or free, and a sweep with or without a path."""
-    kind = draw(st.sampled_from(("forced", "constant", "free")))
-    frequency = 0.0 if kind == "constant" else draw(st.floats(0.3, 3.0))
-    amplitude, phase = draw(st.floats(-8.0, 8.0)), draw(st.sampled_from((0.0, 1.0, -4.0)))
-    forcing = f"[forcing]\namplitude = {amplitude}\nangular_frequency = {frequency}\nphase = {phase}"
-    key = draw(st.sampled_from(SWEPT_FORCED if kind == "forced" else SWEPT))
-    low = draw(st.floats(0.8, 1.2))
-    paths = ("independent", "up", "down", "up-down")
-    path = draw(st.sampled_from(paths[:1] if key in STARTS else paths))
-    sweep = f'"{key}" = {{ start = {low}, stop = {low + 1.0}, points = 4, path = "{path}" }}'
-    return OSCILLATOR.format(
-        mass=1.0,
-        stiffness=draw(st.sampled_from((1.0, 4.0))),
-        damping=draw(st.sampled_from(("damping_ratio = 0.1", "damping = 0.3", ""))),
-        displacement=draw(st.sampled_from((0.0, 0.8))),
-        forcing="" if kind == "free" else forcing,
-        law=draw(st.sampled_from(LAWS)),
-        second=draw(st.sampled_from(SECOND)),
-        record=draw(st.sampled_from(FORCED if kind == "forced" else FREE)),
-        limit=MOST_IMPACTS,
-        sweep=sweep,
-    )
+FUSED = '[execution]\nhow = "fused"\n'
 
 
 def in_both_ways(scene: Scene) -> tuple[xr.Dataset, xr.Dataset]:
@@ -107,13 +50,14 @@ def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 @settings(max_examples=60, deadline=None)
-@given(scenes())
+@given(oscillators("fused"))
 def test_points_in_the_loop_have_the_rows_of_points_run_one_by_one(text: str) -> None:
     assert_equal_bit_for_bit(*in_both_ways(parse_scene(text, "drawn.toml")))
 
 
 def test_a_point_that_its_body_refuses_fails_alone_with_its_message() -> None:
     text = OSCILLATOR.format(
+        how="fused",
         mass=1.0, stiffness=1.0, damping="", displacement=0.0, law=LAWS[0], second="", record=FORCED[0],
         limit=MOST_IMPACTS, sweep='"forcing.angular_frequency" = { values = [1.0, 1e-308, 2.0] }',
         forcing="[forcing]\namplitude = 3.0\nangular_frequency = 1.0\nphase = 1.0",
@@ -129,12 +73,12 @@ def test_chains_and_beams_go_through_the_loop_too() -> None:
     stop = "[[stop]]\nposition = 0.2\nrestitution = 0.4\n"
     chain = (
         '[body]\nkind = "chain"\nmasses = [1.0, 2.0]\nstiffnesses = 5.0\n'
-        f"[forcing]\namplitude = [1.0, 0.5]\nangular_frequency = 1.0\n{stop}{record}[sweep]\n"
+        f"[forcing]\namplitude = [1.0, 0.5]\nangular_frequency = 1.0\n{stop}{record}{FUSED}[sweep]\n"
         '"body.masses[2]" = { values = [1.0, 2.5] }\n"forcing.amplitude[1]" = { values = [0.5, 2.0] }\n'
     )
     beam = (
         '[body]\nkind = "beam"\nlength = 1.0\nmass_per_length = 1.0\nfrequency = 0.7\nmodes = 3\n'
-        f'[forcing]\nkind = "uniform"\namplitude = 4.0\nfrequency = 0.5\n{stop}{record}[sweep]\n'
+        f'[forcing]\nkind = "uniform"\namplitude = 4.0\nfrequency = 0.5\n{stop}{record}{FUSED}[sweep]\n'
         '"body.length" = { values = [0.7, 1.3] }\n"forcing.frequency" = { values = [0.4, 0.6] }\n'
     )
     for text in (chain, beam):
@@ -146,6 +90,7 @@ def test_chains_and_beams_go_through_the_loop_too() -> None:
 
 def test_scenes_that_need_python_between_points_have_no_loop() -> None:
     text = OSCILLATOR.format(
+        how="fused",
         mass=1.0, stiffness=1.0, damping="", displacement=0.0, law=LAWS[0], second="", limit=MOST_IMPACTS,
         record='recorded_time = 5.0\ntime_series = { rate = 10, variables = ["displacement"] }',
         sweep='"body.mass" = { values = [1.0, 2.0] }', forcing="",

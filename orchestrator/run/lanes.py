@@ -1,0 +1,75 @@
+"""What C is told of points that run in lanes (`fmus.core.run_lanes`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core import lanes as core
+from vibroimpact.orchestrator.run.many import PreparedPoints
+from vibroimpact.orchestrator.run.modal import ModalPoints, modal_points
+from vibroimpact.orchestrator.run.parameters import integer_parameters
+from vibroimpact.orchestrator.scene import Scene
+
+Floats = NDArray[np.float64]
+
+DIRECTIONS = {"upper": 1.0, "lower": -1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class LanePoints:
+    """Points as C takes them.
+
+    Attributes
+    ----------
+    plan : LanesPlan
+    modal : ModalPoints
+    given : dict of str to ndarray
+        The arrays of `LanesPoints.GIVEN` by name, without `first`.
+    """
+
+    plan: core.LanesPlan
+    modal: ModalPoints
+    given: dict[str, Floats]
+
+
+def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
+    """Return prepared points as C takes them; those that are no bodies of free modes have numbers that it leaves."""
+    columns, count = points.columns, len(points.begin)
+    modal = modal_points(scene, columns, integer_parameters(scene))
+    stops, record = scene.stops, scene.record
+    numbers = range(1, len(stops) + 1)
+    none = np.zeros(count)
+
+    def each(name: str, default: Floats) -> Floats:
+        rows = [columns.get(f"contact[{k}].{name}", default) for k in numbers]
+        return np.stack(rows) if rows else np.empty((0, count))
+
+    given = {
+        **{name: getattr(modal, name) for name in core.LanesPoints.GIVEN if hasattr(modal, name)},
+        "angular_frequency": columns.get("forcing.angular_frequency", none),
+        "phase": columns.get("forcing.phase", none),
+        "position": each("position", none),
+        "direction": np.repeat(
+            [[DIRECTIONS[stop.side]] for stop in stops] or np.empty((0, 1)), count, axis=1
+        ),
+        "restitution": each("restitution", none),
+        "yield_velocity": each("yield_velocity", none),
+        "begin": points.begin,
+        "end": points.end,
+    }
+    if not points.forced:  # a force without periods is held
+        given["held"] = modal.held + modal.force * np.cos(given["phase"])
+        given["force"] = np.zeros_like(modal.force)
+    plan = core.LanesPlan(
+        modes=modal.stiffness.shape[0],
+        contacts=len(stops),
+        impacts=record.impacts,
+        extrema=record.extrema,
+        periods=points.periods,
+        instructions=core.instructions(),
+        impact_limit=scene.execution.impact_limit,
+    )
+    return LanePoints(plan, modal, {name: np.ascontiguousarray(values) for name, values in given.items()})

@@ -1,0 +1,363 @@
+"""Runs points in lanes, those that the lanes leave by the scalar engine, and makes columns of what they recorded."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS, STICK_COLUMNS, Outcome, RunRecord
+from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
+from vibroimpact.fmus.core import lanes as core
+from vibroimpact.fmus.core.runs import address
+from vibroimpact.orchestrator.run.lanes import lane_points
+from vibroimpact.orchestrator.run.many import PointLoop, PointValues, PreparedPoints
+from vibroimpact.orchestrator.run.many_rows import (
+    LISTEN_SECONDS,
+    final_phases,
+    period_table,
+    ragged_rows,
+    run_loop,
+)
+from vibroimpact.orchestrator.run.parameters import oscillator_start
+from vibroimpact.orchestrator.run.point import limit_message
+from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH
+from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
+
+ROWS_ROOM = 65_536
+"""Rows of impacts and periods that the lanes write before Python takes them."""
+CARRYING = (Outcome.ok, Outcome.stuck)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+State = tuple[float, ...]
+Alone = Callable[[int, State | None], RunRecord]
+"""Runs one point, by its place, from the state it is given."""
+
+
+@dataclass(frozen=True, slots=True)
+class LaneValues:
+    """Points as arrays, and where their branches begin.
+
+    Attributes
+    ----------
+    values : mapping of str to ndarray, shape (point,)
+        Of each swept key.
+    first : ndarray of bool, shape (point,)
+        Where a branch begins. The first point of all begins one too: what there is of its own.
+    starts : mapping of int to tuple of float
+        States of the points that begin a branch, but not as the scene says, by their place.
+    """
+
+    values: Mapping[str, Floats]
+    first: NDArray[np.bool_]
+    starts: Mapping[int, State]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def piece(self, begin: int, stop: int, start: State | None) -> LaneValues:
+        """Return the points `begin` to `stop - 1`, of which the first continues from a state."""
+        starts = {place - begin: state for place, state in self.starts.items() if begin <= place < stop}
+        if not self.first[begin] and start is not None:
+            starts[0] = start
+        first = self.first[begin:stop].copy()
+        first[0] = True
+        return LaneValues({key: each[begin:stop] for key, each in self.values.items()}, first, starts)
+
+    @property
+    def begins_as_scene(self) -> NDArray[np.bool_]:
+        """Which points start as the scene says."""
+        own = self.first.copy()
+        own[list(self.starts)] = False
+        return own
+
+
+def run_in_lanes(
+    loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
+) -> tuple[RunColumns, State | None]:
+    """Run points in lanes; along a branch each starts where the one before ended.
+
+    What a point returns does not depend on the points beside it.
+
+    Parameters
+    ----------
+    loop : PointLoop
+        Of the scene; it runs what the lanes leave.
+    points : LaneValues
+    deadline : float
+        No point begins after it, except the first, and none in a new branch; s of `time.perf_counter`.
+    alone : callable
+        Runs those that the scalar loop leaves out too.
+
+    Returns
+    -------
+    columns : RunColumns
+        Of the points that were run: the first of them.
+    carried : tuple of float or None
+        Where the next point of the branch starts.
+    """
+    prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
+    if prepared is not None:
+        return _LaneRun(loop, points, prepared, alone).run(deadline)
+    if len(points) == 1:
+        given = points.starts.get(0)
+        record = alone(0, given)
+        return columns_of([record]), _next_start(record, given) if loop.chained else None
+    return _run_halves(loop, points, deadline, alone)
+
+
+def run_prepared_in_lanes(
+    loop: PointLoop, points: PreparedPoints, deadline: float, alone: Alone
+) -> RunColumns:
+    """Run points that are independent and have their parameters, see `run_in_lanes`."""
+    values = LaneValues({}, np.ones(len(points.begin), dtype=np.bool_), {})
+    return _LaneRun(loop, values, points, alone).run(deadline)[0]
+
+
+def _run_halves(
+    loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
+) -> tuple[RunColumns, State | None]:
+    """Run points of which some are of another kind than others, or have no parameters."""
+    half = len(points) // 2
+    columns, carried = run_in_lanes(loop, points.piece(0, half, points.starts.get(0)), deadline, alone)
+    if len(columns) < half or time.perf_counter() > deadline:
+        return columns, carried
+    rest = points.piece(half, len(points), carried)
+    more, carried = run_in_lanes(loop, rest, deadline, lambda place, given: alone(half + place, given))
+    return joined([columns, more]), carried
+
+
+def _next_start(record: RunRecord, given: State | None) -> State | None:
+    if record.outcome not in CARRYING:
+        return given
+    if record.final_state is not None:
+        return tuple(record.final_state.tolist())
+    return (record.final_displacement, record.final_velocity)
+
+
+class _LaneRun:
+    """The arrays that C fills, and what the scalar engine has run of the points that C leaves."""
+
+    def __init__(self, loop: PointLoop, values: LaneValues, points: PreparedPoints, alone: Alone) -> None:
+        self._loop, self._values, self._points, self._alone = loop, values, points, alone
+        self._is_oscillator = isinstance(loop.scene.body, OscillatorBody)
+        count, told = len(values), lane_points(loop.scene, points)
+        self._plan, self._modal = told.plan, told.modal
+        self._first = values.first if loop.chained else np.ones(count, dtype=np.bool_)
+        self._given = told.given
+        for place, state in values.starts.items():
+            q, p = np.array(self._free_start(place, state)).reshape(2, -1)
+            self._given["start_q"][:, place], self._given["start_p"][:, place] = q, p
+        modes = self._plan.modes
+        self._state = np.zeros(count, dtype=np.uint8)
+        self._outcome = np.zeros(count, dtype=np.int8)
+        self._reached, self._displacement, self._velocity = np.zeros((3, count))
+        self._final_q, self._final_p = np.zeros((2, modes, count))
+        self._rows, self._owner = np.empty((ROWS_ROOM, ROW_WIDTH)), np.empty(ROWS_ROOM, dtype=np.int64)
+        results = {
+            "state": self._state, "outcome": self._outcome, "reached": self._reached,
+            "displacement": self._displacement, "velocity": self._velocity,
+            "final_q": self._final_q, "final_p": self._final_p,
+            "first": self._first.astype(np.uint8), "rows_of": np.zeros(count, dtype=np.int64),
+            "rows": self._rows, "owner": self._owner,
+        }  # fmt: skip
+        self._kept = {**self._given, **results}  # what C reads and writes while it runs
+        self._c = core.LanesPoints(count=count, rows_room=ROWS_ROOM, most_seconds=LISTEN_SECONDS)
+        for name, array in self._kept.items():
+            setattr(self._c, name, address(array))
+        self._memory = core.lanes_memory(self._plan)
+        self._blocks: list[tuple[Floats, Ints]] = []
+        self._scalar: list[tuple[Ints, RunColumns]] = []
+        self._seconds = 0.0
+
+    # ---- running ----
+
+    def run(self, deadline: float) -> tuple[RunColumns, State | None]:
+        """Run the points, see `run_in_lanes`."""
+        ends = self._call()
+        while ends is not core.LanesEnd.done:
+            self._run_left(deadline)
+            if ends is core.LanesEnd.left and self._left().size:
+                break  # it is too late to begin those
+            if time.perf_counter() > deadline:
+                self._begin_no_more()
+            ends = self._call()
+        self._take_rows()
+        done = self._done()
+        return self._columns(done), self._start_after(done - 1) if self._loop.chained else None
+
+    def _call(self) -> core.LanesEnd:
+        """Let C go on; signals are heard between two calls."""
+        began = time.perf_counter()
+        end = core.run_lanes(self._plan, self._c, self._memory)
+        self._seconds += time.perf_counter() - began
+        if end is core.LanesEnd.full:
+            self._take_rows()
+        return end
+
+    def _take_rows(self) -> None:
+        used = self._c.rows_used
+        self._blocks.append((self._rows[:used].copy(), self._owner[:used].copy()))
+        self._c.rows_used = 0
+
+    def _begin_no_more(self) -> None:
+        """Let what has begun come to its end: points, or branches."""
+        last = int(np.flatnonzero(self._state).max(initial=0))
+        later = np.flatnonzero(self._first[last + 1 : self._c.count])
+        if later.size:
+            self._c.count = last + 1 + int(later[0])
+
+    def _done(self) -> int:
+        """Return how many points, from the first on, have run."""
+        has_run = np.isin(self._state, (core.PointState.has_run, core.PointState.is_answered))
+        return len(has_run) if has_run.all() else int(has_run.argmin())
+
+    # ---- what the lanes leave ----
+
+    def _left(self) -> Ints:
+        return np.flatnonzero(self._state == core.PointState.is_left)
+
+    def _run_left(self, deadline: float) -> None:
+        """Run the points that are left by the scalar engine; along branches none waits for a clock."""
+        left = self._left()
+        if not left.size:
+            return
+        own = (
+            self._values.begins_as_scene if self._loop.chained else np.ones(len(self._state), dtype=np.bool_)
+        )
+        given = {
+            int(place): self._given_state(place) for place in left if self._values.starts or not own[place]
+        }
+        by_itself = [
+            place
+            for place, state in given.items()
+            if not self._is_oscillator or (state is None and not own[place])
+        ]
+        for place in by_itself:
+            self._answer(np.array([place]), columns_of([self._alone(place, given[place])]))
+        rest = left[~np.isin(left, by_itself)]
+        if rest.size:
+            points = self._scalar_points(rest, given)
+            over = np.inf if self._loop.chained else deadline
+            columns, _ = run_loop(self._loop, points, None, over, self._alone_of(rest, given))
+            self._answer(rest[: len(columns)], columns)
+
+    def _alone_of(
+        self, places: Ints, given: Mapping[int, State | None]
+    ) -> Callable[[int, State | None], tuple[RunRecord, None]]:
+        def alone(number: int, _: State | None) -> tuple[RunRecord, None]:
+            place = int(places[number])
+            return self._alone(place, given.get(place)), None
+
+        return alone
+
+    def _scalar_points(self, places: Ints, given: Mapping[int, State | None]) -> PreparedPoints:
+        """Return some points, each the beginning of a branch."""
+        points, names = self._points, self._loop.driver.float_names
+        table = points.table[places]
+        for row, place in enumerate(places):
+            state = given.get(int(place))
+            if state is not None:
+                start = self._free_start(int(place), state)
+                table[row, [names.index(name) for name in ("displacement_start", "velocity_start")]] = start
+                if points.forced:
+                    table[row, names.index("forcing.phase")] = 0.0
+        columns = {name: column[places] for name, column in points.columns.items()}
+        first = np.ones(len(places), dtype=np.bool_)
+        begin, end = points.begin[places], points.end[places]
+        return PreparedPoints(first, table, begin, end, columns, points.forced, points.periods)
+
+    def _answer(self, places: Ints, columns: RunColumns) -> None:
+        """Tell the lanes what the scalar engine has found."""
+        self._scalar.append((places, columns))
+        ended = np.isin(columns.outcome, CARRYING)
+        self._outcome[places] = np.where(ended, Outcome.ok, columns.outcome)
+        if self._is_oscillator:
+            self._final_q[0, places], self._final_p[0, places] = (
+                columns.final_displacement,
+                columns.final_velocity,
+            )
+        elif self._loop.chained and columns.final_state is not None:
+            states = columns.final_state.T.reshape(2, -1, len(places))
+            self._final_q[:, places], self._final_p[:, places] = states
+        self._state[places] = core.PointState.is_answered
+
+    # ---- states along a branch ----
+
+    def _given_state(self, place: int) -> State | None:
+        """Return the state that a point starts from; None as the scene says."""
+        return self._values.starts.get(int(place)) if self._first[place] else self._start_after(place - 1)
+
+    def _start_after(self, place: int) -> State | None:
+        """Return where the point after one starts: where the last that came to its end has ended."""
+        while self._outcome[place] != Outcome.ok:
+            if self._first[place]:
+                return self._values.starts.get(int(place))
+            place -= 1
+        return (*self._final_q[:, place].tolist(), *self._final_p[:, place].tolist())
+
+    def _free_start(self, place: int, state: State) -> State:
+        """Return a carried state with what lies beyond a stop, which has moved, put on it."""
+        scene = self._loop.scene.at({key: float(each[place]) for key, each in self._values.values.items()})
+        if self._is_oscillator:
+            return tuple(oscillator_start(scene, state).values())
+        # what finds the shapes of a beam takes time to load
+        from vibroimpact.orchestrator.run.carried_state import on_free_side
+
+        assert isinstance(scene.body, BeamBody)  # no other structure has branches in lanes
+        return on_free_side(scene, scene.body, state)
+
+    # ---- what was recorded ----
+
+    def _columns(self, done: int) -> RunColumns:
+        """Return what the first points recorded, in their order."""
+        run = np.flatnonzero(self._state[:done] == core.PointState.has_run)
+        pieces = [(run, self._lane_columns(run)), *self._scalar]
+        pieces = [piece for piece in pieces if piece[0].size] or pieces[:1]
+        if len(pieces) == 1 and len(pieces[0][0]) == done:
+            return pieces[0][1]
+        places = np.concatenate([piece[0] for piece in pieces])
+        order = np.argsort(places)
+        return joined([piece[1] for piece in pieces]).chosen(order[:done])
+
+    def _lane_columns(self, run: Ints) -> RunColumns:
+        """Return what the points of these places recorded in their lanes."""
+        record, points = self._loop.scene.record, self._points
+        outcome, reached = self._outcome[run], self._reached[run]
+        rows, owner = self._rows_of(run)
+        message = np.full(len(run), "", dtype=object)
+        for number in np.flatnonzero(outcome == Outcome.impact_limit):
+            message[number] = limit_message(self._loop.scene.execution.impact_limit, float(reached[number]))
+        frequency, phase = (self._given[name][run] for name in ("angular_frequency", "phase"))
+        no_sticks = Ragged(np.zeros(len(run), dtype=np.int64), np.empty((0, len(STICK_COLUMNS))))
+        impacts = (
+            ragged_rows(rows, owner, len(run), ROW_IMPACT, len(IMPACT_COLUMNS)) if record.impacts else None
+        )
+        return RunColumns(
+            outcome=outcome,
+            message=message,
+            seconds=np.full(len(run), self._seconds / max(len(run), 1)),
+            final_displacement=self._displacement[run],
+            final_velocity=self._velocity[run],
+            final_phase=final_phases(outcome, reached, frequency, phase)
+            if points.forced
+            else np.full(len(run), np.nan),
+            final_state=self._modal.states(self._final_q, self._final_p, run),
+            periods=period_table(rows, owner, len(run)) if points.periods else None,
+            impacts=impacts,
+            sticks=no_sticks if record.impacts else None,
+        )
+
+    def _rows_of(self, run: Ints) -> tuple[Floats, Ints]:
+        """Return the rows of some points, those of each together, and the number of each one's owner among them."""
+        number = np.full(len(self._state), -1, dtype=np.int64)
+        number[run] = np.arange(len(run))
+        owner = number[np.concatenate([owners for _, owners in self._blocks])]
+        order = np.argsort(owner.astype(np.int16) if len(run) < 2**15 else owner, kind="stable")
+        order = order[int((owner < 0).sum()) :]  # rows of what was left, or is not among the first
+        rows = np.concatenate([block for block, _ in self._blocks])
+        return rows[order], owner[order]

@@ -1,0 +1,191 @@
+"""Points in lanes are those of the scalar engine to rounding, and the same bits however they are cut."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from support.drawn_oscillators import LAWS, OSCILLATOR, oscillators
+
+from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
+from vibroimpact.orchestrator.campaign.chunks import (
+    DEFAULT_RUNNER,
+    Chunk,
+    columns_of_points,
+    dataset_of,
+    run_columns,
+)
+from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run.many import loop_of
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.sweep import expand, run_count
+
+RIGID = tuple(law for law in LAWS if "kelvin_voigt" not in law)
+FIRST_IMPACTS = 10
+"""Impacts of a point that are compared: a chaotic motion multiplies rounding by what it likes later."""
+AGREEMENT = 1e-9
+"""Difference of their times and velocities: rounding, multiplied by some impacts."""
+
+
+def rows_of(scene: Scene, cuts: Sequence[int] = ()) -> xr.Dataset:
+    """Return the rows of a scene, its points cut where it is said, as the chunks of a campaign are."""
+    runner = named_runner(scene, DEFAULT_RUNNER)
+    loop = loop_of(scene, runner)
+    edges = [0, *cuts, run_count(scene.sweep)]
+    points = columns_of_points(expand(scene), Chunk(0, 0, edges[-1]))
+    pieces: list[RunColumns] = []
+    carried = None
+    for first, stop in pairwise(edges):
+        own = points.chosen(slice(first, stop))
+        ran, carried = run_columns(scene, runner, loop, own, carried, math.inf)
+        pieces.append(ran if isinstance(ran, RunColumns) else columns_of(ran))
+    runner.close()
+    return dataset_of(scene, points, joined(pieces), {})
+
+
+def first_impacts(rows: xr.Dataset, run: int) -> NDArray[np.float64]:
+    own = rows.impact_run.values == rows.run_index.values[run]
+    return np.stack([rows.impact_time.values[own], rows.impact_velocity.values[own]])[:, :FIRST_IMPACTS]
+
+
+def few_impacts(rows: xr.Dataset) -> NDArray[np.bool_]:
+    """Return which runs are known to have few impacts in all that was recorded."""
+    if "impact_count" in rows:
+        return np.asarray(rows.impact_count.values <= FIRST_IMPACTS)
+    if "impacts_per_period" in rows:
+        return np.asarray(np.nansum(rows.impacts_per_period.values, axis=1) <= FIRST_IMPACTS)
+    return np.zeros(rows.sizes["run"], dtype=np.bool_)
+
+
+def assert_agree(lanes: xr.Dataset, fused: xr.Dataset) -> None:
+    assert lanes.outcome.values.tolist() == fused.outcome.values.tolist()
+    if "impact_run" in lanes:
+        for run in range(lanes.sizes["run"]):
+            one, other = first_impacts(lanes, run), first_impacts(fused, run)
+            assert one.shape == other.shape
+            assert one == pytest.approx(other, rel=AGREEMENT, abs=AGREEMENT)
+    short = few_impacts(fused)
+    for name in ("final_displacement", "final_velocity", "displacement_max", "strobe_velocity"):
+        if name in lanes:
+            values, wanted = (rows[name].values[short] for rows in (lanes, fused))
+            assert values == pytest.approx(wanted, rel=AGREEMENT, abs=AGREEMENT, nan_ok=True)
+
+
+def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
+    for name in set(one.variables) - {"point_seconds"}:
+        values, wanted = one[name].values, other[name].values
+        same = (values == wanted).all() if values.dtype == object else values.tobytes() == wanted.tobytes()
+        assert same, name
+
+
+def with_execution(text: str, how: str) -> Scene:
+    return parse_scene(text.replace('how = "auto"', f'how = "{how}"'), "drawn.toml")
+
+
+@settings(max_examples=40, deadline=None)
+@given(text=oscillators("auto", RIGID), data=st.data())
+def test_points_in_lanes_are_those_of_the_scalar_engine_however_they_are_cut(text: str, data: Any) -> None:
+    across = text + '"stop[1].restitution" = { values = [0.0, 0.5, 1.0] }\n'
+    scene = with_execution(across, "auto")
+    assert named_runner(scene, DEFAULT_RUNNER).execution == "lanes"
+    whole = rows_of(scene)
+    assert_agree(whole, rows_of(with_execution(across, "fused")))
+    cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
+    assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
+
+
+def test_a_point_with_bad_numbers_fails_alone_with_the_message_of_its_body() -> None:
+    text = OSCILLATOR.format(
+        mass=1.0, stiffness=1.0, damping="", displacement=0.0, law=RIGID[0], second="", how="auto", limit=300,
+        record="transient_periods = 2\nrecorded_periods = 3",
+        sweep='"forcing.angular_frequency" = { values = [1.0, 1e-308, 2.0] }\n'
+        '"stop[1].position" = { values = [1.0, 0.5] }',
+        forcing="[forcing]\namplitude = 3.0\nangular_frequency = 1.0\nphase = 1.0",
+    )  # fmt: skip
+    lanes, fused = (rows_of(with_execution(text, how)) for how in ("auto", "fused"))
+    assert lanes.outcome.values.tolist() == [0, 0, 3, 3, 0, 0]
+    assert lanes.message.values.tolist() == fused.message.values.tolist()
+    assert_agree(lanes, fused)
+
+
+CHAIN = """
+[body]
+kind = "chain"
+masses = [1.0, 2.0, 1.5]
+stiffnesses = 5.0
+dampings = {dampings}
+modes = {modes}
+[forcing]
+amplitude = [1.0, 0.5, 0.0]
+angular_frequency = 1.0
+[[stop]]
+position = 0.2
+restitution = 0.4
+[record]
+transient_periods = 2
+recorded_periods = 3
+[execution]
+how = "auto"
+[sweep]
+"body.masses[2]" = {{ values = [1.0, 2.5] }}
+"forcing.amplitude[1]" = {{ values = [0.5, 2.0] }}
+"""
+BEAM = """
+[body]
+kind = "beam"
+length = 1.0
+mass_per_length = 1.0
+frequency = 0.7
+damping_ratio = 0.05
+modes = {modes}
+[forcing]
+kind = "{kind}"
+{mode}
+amplitude = 4.0
+frequency = 0.5
+[[stop]]
+position = 0.2
+restitution = 0.4
+[[stop]]
+position = -0.3
+side = "lower"
+location = 0.6
+restitution = 0.8
+[record]
+transient_periods = 2
+recorded_periods = 3
+[execution]
+how = "auto"
+[sweep]
+"body.length" = {{ values = [0.7, 1.3] }}
+"forcing.frequency" = {{ values = [0.4, 0.6]{path} }}
+"""
+
+
+def beam(kind: str, modes: int, path: str = "independent") -> str:
+    mode = "mode = 1" if kind == "mode" else ""
+    return BEAM.format(kind=kind, mode=mode, modes=modes, path=f', path = "{path}"')
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        CHAIN.format(modes=1, dampings=0.0),
+        CHAIN.format(modes=3, dampings=[0.1, 0.1, 0.1]),
+        CHAIN.format(modes=3, dampings=[0.1, 0.4, 0.2]),
+        *(beam(kind, 1) for kind in ("force", "uniform", "mode", "base_acceleration")),
+        beam("uniform", 3),
+        beam("force", 2, path="up-down"),
+    ],
+    ids=["chain", "modes", "coupled", "force", "uniform", "mode", "base", "beam", "path"],
+)
+def test_chains_and_beams_in_lanes_are_those_of_the_scalar_engine(text: str) -> None:
+    assert_agree(rows_of(with_execution(text, "auto")), rows_of(with_execution(text, "fused")))

@@ -1,0 +1,96 @@
+"""Campaigns whose points run in lanes: cut anywhere they have the same bits, and no two engines are mixed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from support.campaign_scenes import assert_same_rows, scene_of
+from support.serial_pool import campaign_here
+
+import vibroimpact.orchestrator.campaign.schedule as schedule
+from vibroimpact.analysis.dataset import read_flat
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.campaign import CampaignInterrupted
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
+from vibroimpact.orchestrator.campaign.manifest import read_manifest, write_manifest
+
+BODY = """
+[body]
+mass = 1.0
+stiffness = 1.0
+damping_ratio = 0.05
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.8
+[[stop]]
+position = 0.3
+restitution = 0.7
+[record]
+transient_periods = 10
+recorded_periods = 2
+[sweep]
+"""
+RESTITUTION = '"stop[1].restitution" = { values = [0.0, 0.4, 0.8] }\n'
+
+
+def frequency(path: str, points: int = 9) -> str:
+    return (
+        f'"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points}, path = "{path}" }}\n'
+    )
+
+
+MAP = BODY + RESTITUTION + frequency("independent")
+BRANCHES = BODY + RESTITUTION + frequency("up-down")
+PATH = BODY + frequency("up-down")
+
+
+@pytest.mark.parametrize("text", [MAP, BRANCHES], ids=["map", "branches"])
+def test_a_campaign_in_lanes_that_is_interrupted_has_the_bits_of_one_that_is_not(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = campaign_here(monkeypatch, text, tmp_path / "whole", runner=DEFAULT_RUNNER)
+    with monkeypatch.context() as patch:
+        patch.setattr(schedule, "FIRST_POINTS", 4)
+        patch.setattr(schedule, "MOST_POINTS", 5)
+        with pytest.raises(CampaignInterrupted):
+            campaign_here(monkeypatch, text, tmp_path / "cut", runner=DEFAULT_RUNNER, most_chunks=4)
+    assert campaign_here(monkeypatch, text, tmp_path / "cut", runner=DEFAULT_RUNNER).resumed > 0
+    assert_same_rows(whole.dataset, tmp_path / "cut" / "dataset.nc")
+    rows = read_flat(whole.dataset)
+    assert (rows.attrs["execution"], rows.attrs["engine_version"]) == ("lanes", 2)
+    assert rows.attrs["engine"].startswith("lanes, many points at once: Oscillator")
+    assert set(rows.outcome.values) == {0}
+    assert (rows.impact_count.values > 0).any()
+
+
+def test_a_path_that_is_extended_by_another_key_goes_on_fused_as_it_began(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wider = BODY + RESTITUTION.replace("0.8", "0.7") + frequency("up-down")
+    campaign_here(monkeypatch, PATH, tmp_path / "path", runner=DEFAULT_RUNNER)
+    report = campaign_here(monkeypatch, wider, tmp_path / "path", runner=DEFAULT_RUNNER)
+    assert report.resumed == 18
+    fused = wider + '[execution]\nhow = "fused"\n'
+    alone = campaign_here(monkeypatch, fused, tmp_path / "fused", runner=DEFAULT_RUNNER)
+    assert_same_rows(report.dataset, alone.dataset)
+    assert read_flat(report.dataset).attrs["execution"] == "fused"
+    assert read_flat(report.dataset).attrs["engine"].startswith("fused")
+
+
+def test_a_half_done_campaign_of_another_engine_is_refused_by_one_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(schedule, "FIRST_POINTS", 4)
+        with pytest.raises(CampaignInterrupted):
+            campaign_here(patch, MAP, tmp_path, runner=DEFAULT_RUNNER, most_chunks=1)
+    path = tmp_path / "campaign.json"
+    manifest = read_manifest(path)
+    assert manifest is not None
+    write_manifest(path, scene_of(MAP), replace(manifest.identity, engine=1), manifest.runs)
+    parts = sorted((tmp_path / "parts").iterdir())
+    with pytest.raises(UsageError, match=r"engine was 1, is 2\. Results of two kinds are never mixed"):
+        campaign_here(monkeypatch, MAP, tmp_path, runner=DEFAULT_RUNNER)
+    assert sorted((tmp_path / "parts").iterdir()) == parts

@@ -1,0 +1,58 @@
+"""Which scenes run many points at once."""
+
+from __future__ import annotations
+
+import pytest
+
+from vibroimpact.orchestrator.scene import parse_scene
+from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
+
+OSCILLATOR = "[body]\nmass = 1.0\nstiffness = 1.0\n"
+CHAIN = '[body]\nkind = "chain"\nmasses = [1.0, 1.0]\nstiffnesses = 1.0\n'
+BEAM = '[body]\nkind = "beam"\nlength = 1.0\nmass_per_length = 1.0\nfrequency = 1.0\nmodes = {modes}\n'
+FORCING = "[forcing]\nangular_frequency = 1.0\namplitude = {amplitude}\n"
+STOP = "[[stop]]\nposition = 1.0\nrestitution = 0.5\n"
+RECORD = "[record]\nrecorded_periods = 1\n"
+SWEEP = '[sweep]\n"stop[1].position" = { values = [1.0, 2.0] }\n'
+PATH = '"forcing.angular_frequency" = { values = [1.0, 2.0], path = "up" }\n'
+
+
+def scene(body: str = OSCILLATOR, *, stop: str = STOP, record: str = RECORD, rest: str = SWEEP) -> str:
+    amplitude = "[1.0, 0.0]" if "chain" in body else "1.0"
+    return body + FORCING.format(amplitude=amplitude) + stop + record + rest
+
+
+TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (scene(), True),
+        (scene(stop=TWO), True),
+        (scene(CHAIN), True),
+        (scene(BEAM.format(modes=8)), True),
+        (scene(rest=SWEEP + PATH), True),
+        (scene(BEAM.format(modes=2), rest=SWEEP + PATH), True),
+        (scene(CHAIN, rest=SWEEP + PATH), False),
+        (scene(rest="[sweep]\n" + PATH), False),
+        (scene(rest=""), False),
+        (scene(BEAM.format(modes=9)), False),
+        (scene(BEAM.format(modes=2) + 'impact_projection = "collocation"\n'), False),
+        (scene(BEAM.format(modes=2), rest=SWEEP + '"body.modes" = { values = [1, 2] }\n'), False),
+        (scene(stop='[[stop]]\nposition = 1.0\nlaw = "hertz"\nstiffness = 10.0\n'), False),
+        (scene(rest='[execution]\nhow = "fused"\n' + SWEEP), False),
+        (scene(rest="[execution]\ndeadline = 1.0\n" + SWEEP), False),
+        (scene(record=RECORD + "time_series = { rate = 10 }\n"), False),
+        (scene(OSCILLATOR + "frequency_slope = 0.1\n"), False),
+    ],
+)
+def test_lanes_take_few_modes_between_rigid_stops_that_can_run_beside_each_other(
+    text: str, *, expected: bool
+) -> None:
+    assert goes_by_lanes(parse_scene(text, "scene.toml")) is expected
+
+
+def test_the_choice_does_not_depend_on_the_number_of_points() -> None:
+    for values in ("[1.0]", "[1.0, 2.0, 3.0]"):
+        assert goes_by_lanes(parse_scene(scene(rest=SWEEP.replace("[1.0, 2.0]", values)), "scene.toml"))
