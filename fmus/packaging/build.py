@@ -211,7 +211,7 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
     # loops over the modes of a body that has no more than one cost nothing
-    return arrays if modes is not None else {**arrays, "VI_ONLY_MODES": 1}
+    return {**arrays, "VI_ONLY_MODES": 0 if modes is not None else 1}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:
