@@ -14,6 +14,9 @@ static const double WEIGHTS[4] = {0.36268378337836198297, 0.31370664587788728734
 /* Length of a piece of quadrature times the fastest rate: eight points then integrate to the last digits. */
 static const double PIECE = 1.5;
 
+/* Pieces of a segment of drift, which may be 5 over the fastest rate. */
+enum { DRIFT_PIECES = 4 };
+
 /* Evaluations that a climb is counted as. */
 enum { CLIMB = 8 };
 
@@ -169,9 +172,10 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
                           double u)
 {
     const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
+    const double piece = vi_drift_variable(drift, u) / DRIFT_PIECES;
     double q[VI_MODES], p[VI_MODES], weight, value[4];
-    for (int i = 0; i < 8; ++i) {
-        const double r = node(0.0, vi_drift_variable(drift, u), i, &weight), t = drift->rooted ? r * r : r;
+    for (int i = 0; i < 8 * DRIFT_PIECES; ++i) {
+        const double r = node((double)(i / 8) * piece, piece, i % 8, &weight), t = drift->rooted ? r * r : r;
         const double slope = drift->rooted ? 2.0 * r : 1.0; /* of t over r */
         vi_drift_at(drift, t, s->state->q, p, q);
         add_powers(s, p, held, t, angle + w * t, slope * weight);
