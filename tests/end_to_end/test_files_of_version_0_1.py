@@ -20,6 +20,7 @@ from support.tolerance import SEQUENCE
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import constant_names, read_flat, take_runs, write_dataset
 from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.point import ENGINE
 
 FILES = Path(__file__).with_name("version_0_1.zip")
 
@@ -70,24 +71,40 @@ def components_of(campaign: Path) -> dict[str, Any]:
     return content
 
 
-def test_a_half_done_campaign_of_other_components_is_refused_in_one_line_and_keeps_its_parts(
-    old: Path,
-) -> None:
+def half_of_this_engine(old: Path, **more: Any) -> Path:
+    """Return the half-done campaign, its manifest rewritten: begun with the engine of now, and `more`."""
     half = old / "half"
+    (half / "campaign.json").write_text(json.dumps(components_of(half) | {"engine": ENGINE} | more))
+    return half
+
+
+def refused_with_its_parts_kept(half: Path, old: Path) -> str:
+    """Return the one line with which a half-done campaign is refused, which changes nothing in its folder."""
     manifest = (half / "campaign.json").read_bytes()
     parts = {path: path.read_bytes() for path in (half / "parts").iterdir()}
     done = vibroimpact("campaign", old / "half.toml", "-o", half)
     assert done.returncode == 2
-    assert "fmu_hashes.body was" in done.stderr
-    assert "restitution = 0.5) is stored as" in done.stderr
+    assert done.stderr.count("\n") == 1
     assert "choose another folder" in done.stderr
     assert {path: path.read_bytes() for path in (half / "parts").iterdir()} == parts
     assert (half / "campaign.json").read_bytes() == manifest
+    return done.stderr
+
+
+def test_a_half_done_campaign_of_the_engine_before_is_refused_in_one_line(old: Path) -> None:
+    assert f"engine was 1, is {ENGINE}" in refused_with_its_parts_kept(old / "half", old)
+
+
+def test_a_half_done_campaign_of_other_components_is_refused_in_one_line(old: Path) -> None:
+    said = refused_with_its_parts_kept(half_of_this_engine(old), old)
+    assert "fmu_hashes.body was" in said
+    assert "restitution = 0.5) is stored as" in said
 
 
 def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equal(old: Path) -> None:
-    half = old / "half"
-    done = vibroimpact("run", old / "half.toml", "-o", old / "now.nc")
+    half = half_of_this_engine(old)
+    # as it was begun: in lanes, which "auto" chooses for a new one, last bits are others
+    done = vibroimpact("run", old / "half.toml", "--set", "execution.how=fused", "-o", old / "now.nc")
     assert done.returncode == 0, done.stderr
     [part] = (half / "parts").iterdir()
     now = take_runs(read_flat(old / "now.nc"), np.arange(3))
@@ -104,9 +121,7 @@ def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equa
 
 
 def test_a_half_done_campaign_goes_on_from_its_parts(old: Path) -> None:
-    half = old / "half"
-    content = components_of(half) | {"fmu_hashes": {"body": BodyDriver({}, {}).hashes["body"]}}
-    (half / "campaign.json").write_text(json.dumps(content))
+    half = half_of_this_engine(old, fmu_hashes={"body": BodyDriver({}, {}).hashes["body"]})
     [part] = (half / "parts").iterdir()
     kept = read_flat(part).impact_time.values
     done = vibroimpact("campaign", old / "half.toml", "-o", half, "--workers", "1")

@@ -56,8 +56,9 @@ def sine(bench: Bench, *more: str, output: str = "Dev1/ao0") -> subprocess.Compl
 
 
 def guardians() -> list[int]:
-    """Return the guardians that this process has started."""
-    return [child.pid for child in psutil.Process().children() if "guardian" in " ".join(child.cmdline())]
+    """Return the guardians that this process has started and that run; a zombie, of another test say, has ended."""
+    running = [child for child in psutil.Process().children() if child.status() != psutil.STATUS_ZOMBIE]
+    return [child.pid for child in running if "guardian" in " ".join(child.cmdline())]
 
 
 def test_a_sine_of_a_duration_ends_at_rest(bench: Bench) -> None:
