@@ -1,6 +1,6 @@
 """Which scenes go by lanes: their points run many at once (`fmus.core.run_lanes`).
 
-`execution.how = "auto"` lets the points of a sweep that is not refined run so where its bodies have few modes between
+`execution.how = "auto"` lets the points of a sweep run so where its bodies have few modes between
 restitution stops and each point is a run by itself or continues the one before. A point that chatters, rests or is rare
 in another way is left by the lanes: it runs by the scalar engine, from its start, as in a fused run.
 """
@@ -21,7 +21,6 @@ def goes_by_lanes(scene: Scene) -> bool:
     return (
         execution.how == "auto"
         and bool(scene.sweep)
-        and not any(axis.adaptive for axis in scene.sweep)
         and not execution.guard
         # the clock of a point that shares its lanes is not its own
         and execution.deadline is None

@@ -18,8 +18,12 @@ from pathlib import Path
 import numpy as np
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard.guarded import make_runner
+from vibroimpact.orchestrator.run import lanes_rows
+from vibroimpact.orchestrator.run.many import PointLoop
+from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
 
@@ -100,6 +104,26 @@ class UnhurriedRunner:
     def close(self) -> None:
         """End the real runner."""
         self._runner.close()
+
+
+def unhurried_lanes(scene: Scene, *, execution: str = "auto") -> PointRunner:
+    """Return the real runner of a scene that goes by lanes, which sleep before each chunk as long as points may take.
+
+    Chunks are short then and often cut: the time of one is over when its first points begin.
+    """
+    runner = make_runner(scene, execution=execution)
+    assert isinstance(runner, PointRunner)
+    assert runner.execution == "lanes"
+    at_once = lanes_rows.run_in_lanes
+
+    def later(
+        loop: PointLoop, points: lanes_rows.LaneValues, deadline: float, alone: lanes_rows.Alone
+    ) -> tuple[RunColumns, tuple[float, ...] | None]:
+        time.sleep(0.01 * len(points))
+        return at_once(loop, points, deadline, alone)
+
+    lanes_rows.run_in_lanes = later  # of this process, a worker
+    return runner
 
 
 class BrittleRunner(BusyRunner):

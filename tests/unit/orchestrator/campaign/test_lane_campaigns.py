@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from support.campaign_process import CampaignProcess
 from support.campaign_scenes import assert_same_rows, scene_of
 from support.serial_pool import campaign_here
 
@@ -63,6 +66,33 @@ def test_a_campaign_in_lanes_that_is_interrupted_has_the_bits_of_one_that_is_not
     assert rows.attrs["engine"].startswith("lanes, many points at once: Oscillator")
     assert set(rows.outcome.values) == {0}
     assert (rows.impact_count.values > 0).any()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and sessions")
+@pytest.mark.parametrize("path", ["independent", "up-down"])
+def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lanes(
+    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    restitution = '"stop[1].restitution" = { start = 0.0, stop = 0.9, points = 40 }\n'
+    text = BODY + restitution + frequency(path, 12)
+    whole = campaign_here(monkeypatch, text, tmp_path / "whole", runner=DEFAULT_RUNNER)
+    rests = read_flat(whole.dataset).stick_count.values > 0
+    assert 0 < np.count_nonzero(rests) < rests.size  # the lanes leave points that rest
+    (tmp_path / "scene.toml").write_text(text)
+    command = (tmp_path / "scene.toml", tmp_path / "killed", "--workers", "2")
+    killed = CampaignProcess(*command, runner="unhurried_lanes")
+    killed.wait_for_parts(1)
+    killed.workers()[0].kill()
+    killed.wait_for_parts(3)
+    killed.process.kill()
+    killed.end()
+    killed.assert_nothing_lives()
+    assert not (tmp_path / "killed" / "dataset.nc").exists()
+    code, out, err = CampaignProcess(*command, runner="unhurried_lanes").end()
+    assert code == 0, err
+    assert "by 2 workers, " in out  # both had points to compute, others were there
+    assert_same_rows(whole.dataset, tmp_path / "killed" / "dataset.nc")
 
 
 def test_a_path_that_is_extended_by_another_key_goes_on_fused_as_it_began(
