@@ -9,19 +9,11 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
-from support.structure import DONE, Modes, Stop, Structure
+from support.structure import DONE, Modes, Stop, Structure, peaking
 from support.tolerance import SEQUENCE
 
 MODES = [1, 2, 8]
 EXCESS = [10.0**-n for n in (2, 4, 6, 8, 10, 12)]
-
-
-def peaking(modes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frequencies, shape and start; shape . q is largest, 1, at the time pi, and every 2 pi later."""
-    natural = 2.0 * np.arange(modes) + 1.0
-    shape = np.where(np.arange(modes) % 2 == 0, 1.0, -1.0) / (1.0 + np.arange(modes))
-    share = 1.0 / natural**2
-    return natural, shape, -share / share.sum() / shape
 
 
 @pytest.mark.parametrize("modes", MODES)

@@ -170,6 +170,16 @@ def drawn(
     }
 
 
+def oscillators(count: int, transient: int, recorded: int, **values: object) -> Columns:
+    """Return oscillators of mass 1 and stiffness 1 with one stop, forced from phase 0."""
+    points = taken(drawn(1, 1, 1, 0), np.zeros(count, np.int64))
+    given = {"held": 0.0, "phase": 0.0, "shape": 1.0, "impulse": 1.0, "observed": 1.0, "stiffness": 1.0}
+    for name, value in {**given, "yield_velocity": 0.0, "direction": 1.0, **values}.items():
+        points[name] = np.broadcast_to(np.asarray(value, dtype=np.float64), points[name].shape).copy()
+    period = TURN / points["angular_frequency"]
+    return {**points, "begin": transient * period, "end": (transient + recorded) * period}
+
+
 def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Structure:
     """Run one of the points by the scalar engine of bodies of many modes, recording from its start."""
     p = {name: array[..., place] for name, array in points.items()}

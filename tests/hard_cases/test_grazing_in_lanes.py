@@ -1,0 +1,102 @@
+"""No impact is lost at a graze in lanes: the ladders of one mode and of many, and ripples over a stop.
+
+What rounding would decide the lanes leave for the scalar engine; all else they have to see themselves.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from support.lane_points import IMPACT, TURN, Columns, follow_alone, oscillators, run
+from support.structure import peaking
+from support.tolerance import SEQUENCE
+
+LEVELS = [10.0**-n for n in (2, 3, 4, 5, 6, 7, 8, 9, 10)]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
+    # a steady motion whose peak exceeds the stop ever less, from eight phases; and one that stays below it
+    zeta, w = 0.05, 0.8
+    size, lag = math.hypot(1.0 - w * w, 2.0 * zeta * w), math.atan2(2.0 * zeta * w, 1.0 - w * w)
+    excess, phase = (each.ravel() for each in np.meshgrid(LEVELS, TURN * np.arange(8) / 8 + 0.1))
+    amplitude = 1.0 + sign * excess
+    points = oscillators(
+        len(excess),
+        0,
+        3,
+        decay=zeta,
+        angular_frequency=w,
+        force=amplitude * size,
+        phase=phase,
+        start_q=np.minimum(1.0 - 1e-9, amplitude * np.cos(phase - lag)),
+        start_p=-w * amplitude * np.sin(phase - lag),
+        position=1.0,
+        restitution=0.7,
+    )
+    points["begin"] = np.zeros(len(excess))
+    found = run(points)
+    impacts = np.array([np.count_nonzero(rows[:, 0] == IMPACT) for rows in found.rows])
+    if sign > 0.0:
+        assert np.all((impacts > 0) | ~found.has_run)  # what rounding would decide is left
+    else:
+        assert np.all(impacts == 0)
+    assert np.count_nonzero(found.has_run) >= 0.9 * len(excess)
+
+
+def undamped(
+    natural: np.ndarray, shape: np.ndarray, start: np.ndarray, position: list[float], end: float
+) -> Columns:
+    """Return bodies without losses or force that are let go, each between its modes' far side and its own stop."""
+    count, modes = len(position), len(natural)
+    points = oscillators(
+        count, 0, 1, angular_frequency=TURN / end, force=0.0, restitution=0.6, position=position
+    )
+
+    def column(values: np.ndarray | float) -> np.ndarray:
+        return np.repeat(np.broadcast_to(values, modes)[:, None], count, axis=1)
+
+    of_modes = {"stiffness": natural**2, "decay": 0.0, "force": 0.0, "held": 0.0, "observed": shape}
+    points |= {name: column(values) for name, values in of_modes.items()}
+    points |= {"start_q": column(start), "start_p": column(0.0)}
+    points |= {name: column(shape)[None].copy() for name in ("shape", "impulse")}
+    return points
+
+
+@pytest.mark.parametrize("modes", [1, 2, 8])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_peak_of_many_modes_over_the_stop_is_an_impact_however_little_it_is(
+    modes: int, sign: float
+) -> None:
+    natural, shape, start = peaking(modes)
+    excess = np.array(LEVELS)
+    found = run(undamped(natural, shape, start, (1.0 - sign * excess).tolist(), 1.5 * math.pi))
+    impacts = [rows[rows[:, 0] == IMPACT] for rows in found.rows]
+    assert found.has_run[excess >= 1e-9].all()
+    assert [len(rows) > 0 for rows in impacts] == (found.has_run & (sign > 0.0)).tolist()
+    if sign > 0.0:
+        curve, bend = -shape * start @ natural**2, -shape * start @ natural**4
+        for rows, over in zip(impacts[:5], LEVELS[:5], strict=True):
+            allowed = bend / curve**2 * over + 4e-16 / over
+            assert rows[0, 3] == pytest.approx(math.sqrt(2.0 * curve * over), rel=allowed)
+
+
+@pytest.mark.parametrize(("ripple", "fast"), [(1e-2, 211.0), (1e-3, 211.0), (1e-1, 61.0), (1e-2, 61.0)])
+def test_the_ripples_of_a_fast_mode_over_the_stop_are_those_that_the_scalar_engine_finds(
+    ripple: float, fast: float
+) -> None:
+    # a slow heavy mode carries a light fast one to the stop: a sampler with 100 points per slow period sees none of it
+    natural, shape, start = np.array([1.0, fast]), np.array([0.02, 1.0]), np.array([-50.0, ripple])
+    over = np.linspace(0.1, 0.9, 8)
+    points = undamped(natural, shape, start, (1.0 + over * ripple).tolist(), 4.0)
+    found = run(points, extrema=False)
+    seen = 0
+    for place in np.flatnonzero(found.has_run):
+        with follow_alone(points, int(place)) as body:
+            expected = body.impacts
+        impacts = found.rows[place][found.rows[place][:, 0] == IMPACT]
+        assert len(impacts) == len(expected)
+        difference = np.abs(impacts[:, [1, 3]] - expected[:, [1, 3]])
+        assert difference.max(initial=0.0) <= 100.0 * SEQUENCE
+        seen += len(impacts)
+    assert seen > 0
