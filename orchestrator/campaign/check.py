@@ -23,8 +23,8 @@ MOST_TRIAL_SECONDS = 20.0
 """Wall time after which the trial point is given up, s."""
 LONG_ENOUGH = 0.5
 """A shorter trial is repeated, s: the first call of a process is slower than all that follow."""
-LANE_TRIALS = 64
-"""Points that are tried together where they run in lanes."""
+LANE_TRIALS, FEWEST_LANE_TRIALS = 64, 8
+"""Points that are tried together where they run in lanes: fewer where one by itself takes long."""
 GOLDEN = 0.6180339887498949
 """Its multiples, of its powers likewise, spread over the unit interval: no two axes move together."""
 SECONDS_BESIDE = 3e-5
@@ -165,20 +165,23 @@ def _tried(scene: Scene) -> Trial:
     finally:
         runner.close()
     trial = _trial(limited, point, record, given_up=deadline != scene.execution.deadline)
-    return replace(trial, lane_seconds=_lane_seconds(scene)) if goes_by_lanes(scene) else trial
+    if trial.given_up or not goes_by_lanes(scene):
+        return trial
+    together = int(MOST_TRIAL_SECONDS / max(record.seconds, MOST_TRIAL_SECONDS / LANE_TRIALS))
+    return replace(trial, lane_seconds=_lane_seconds(scene, max(together, FEWEST_LANE_TRIALS)))
 
 
-def _lane_seconds(scene: Scene) -> float:
-    """Return what one of some points, spread over the sweep, takes when they run in lanes, s."""
+def _lane_seconds(scene: Scene, count: int) -> float:
+    """Return what one of so many points, spread over the sweep, takes when they run in lanes, s."""
     # what finds points their lanes takes time to load, and only these scenes need it
     from vibroimpact.orchestrator.run.lanes_rows import LaneValues, run_in_lanes
 
-    share = np.arange(LANE_TRIALS)
+    share = np.arange(count)
     values: dict[str, NDArray[np.float64]] = {}
     for number, members in enumerate(dimensions(scene.sweep)):
         place = (share * GOLDEN ** (number + 1) % 1.0 * len(members[0].values)).astype(np.int64)
         values |= {axis.key: np.array(axis.values)[place] for axis in members}
-    first = np.ones(LANE_TRIALS, dtype=np.bool_)
+    first = np.ones(count, dtype=np.bool_)
 
     def alone(place: int, given: tuple[float, ...] | None) -> RunRecord:
         return run_point(

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.branches import dataset_of_branches, dataset_of_loci
@@ -173,7 +174,7 @@ def _is_on(
         if locus.kind == point.kind and locus.points[0].orbit.name == point.at.orbit.name:
             rows = np.array([each.values for each in locus.points])
             apart = (rows - (point.at.value, value)) / (first.span, second.span)
-            if np.hypot.reduce(apart, axis=1).min() < SAME_ORBIT:
+            if _off_path(apart, np.diff(apart, axis=0)) < SAME_ORBIT:
                 return True
     return False
 
@@ -311,16 +312,33 @@ def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settin
         alike = branch.orbits[0].orbit
         if alike.periods != orbit.periods or alike.phases.size != orbit.phases.size:
             continue
+        off = ((branch.values - value) / settings.span)[:, None]
         rows = np.array([each.orbit.phases for each in branch.orbits])
-        off = (branch.values - value) / settings.span
+        steps = np.diff(np.hstack([rows, off]), axis=0)
         for first in range(orbit.phases.size):
             if (np.roll(orbit.contacts, -first) != alike.contacts).any():
                 continue
             apart = rows - np.append(orbit.phases[first:], orbit.phases[:first] + whole)
             apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
-            if np.hypot(np.hypot.reduce(apart, axis=1), off).min() < SAME_ORBIT:
+            if _off_path(np.hstack([apart, off]), steps) < SAME_ORBIT:
                 return True
     return False
+
+
+def _off_path(apart: NDArray[np.float64], steps: NDArray[np.float64]) -> float:
+    """Return how far something is off a path.
+
+    Parameters
+    ----------
+    apart : ndarray, shape (n, d)
+        What parts it from the points of the path.
+    steps : ndarray, shape (n - 1, d)
+        From each point to the next.
+    """
+    squares = np.maximum((steps**2).sum(axis=1), np.finfo(np.float64).tiny)
+    shares = np.clip(-(apart[:-1] * steps).sum(axis=1) / squares, 0.0, 1.0)
+    nearest = np.vstack([apart[-1:], apart[:-1] + shares[:, None] * steps])
+    return float(np.sqrt((nearest**2).sum(axis=1)).min())
 
 
 def _refuse(

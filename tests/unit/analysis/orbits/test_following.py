@@ -49,7 +49,7 @@ def test_the_determinant_holds_on_every_orbit_and_stability_changes_at_its_point
     lower = [each for each in inside if np.real(each.orbit.multipliers[0]) < -1.0]
     assert max(each.value for each in lower) <= doubling
     saddles = [each for each in inside if np.real(each.orbit.multipliers[0]) > 1.0]
-    assert all(1.2185 < each.value < fold for each in saddles)
+    assert all(1.2185 < each.value <= fold for each in saddles)
 
 
 def test_the_branch_that_leaves_at_the_doubling_has_its_fold_and_its_graze(

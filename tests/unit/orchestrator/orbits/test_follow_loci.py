@@ -56,6 +56,13 @@ def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_spee
     assert slow == pytest.approx((0.47955763624, 0.31956742827), abs=1e-10)
 
 
+@pytest.mark.parametrize("longest", [0.01, 0.05, 0.2])
+def test_a_branch_is_followed_once_however_far_its_orbits_lie_apart(longest: float) -> None:
+    scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372})
+    found = follow_branches(scene, PARAMETER, 1.6, 2.2, longest=longest, doublings=0)
+    assert [branch.name for branch in found.branches] == ["P(1,1)"]
+
+
 def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_of_these_grazes() -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372, PARAMETER: 1.75})
     branches = follow_branches(scene, PARAMETER, 1.6, 2.2, longest=0.05)
