@@ -10,7 +10,7 @@ static const double SHORTEST_STEP = 0.05;
 /* Rounding of samples, in units of the terms that displacements are sums of; contacts closer than that are not for
  * samples to tell. */
 static const double ROUNDING = 1e-12;
-/* Of a single mode, whose displacement is all there is to a chord, steps beyond .8 radians clear little. */
+/* Of a single mode steps beyond .8 radians clear little. */
 enum { LONGEST_OF_ONE = 4 };
 /* Blocks of samples after which a scan ends where it is. */
 enum { MOST_BLOCKS = 4096 };
@@ -65,7 +65,7 @@ static void make(vi_scan_level *level, const vi_scan *scan, const vi_structure_m
 
 /* Bounds of the unforced part of a mode. */
 typedef struct {
-    double reach, rate, second, third; /* of the displacement and its derivatives */
+    double reach, rate, fourth; /* of the displacement, its first and its fourth derivative */
 } extent;
 
 /* An instant that samples are counted from. */
@@ -92,35 +92,61 @@ static extent extent_of(const vi_segment *segment)
     const vi_mode *mode = segment->mode;
     const double x = segment->start, v = segment->start_rate;
     if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
-        const double rate = mode->natural * segment->amplitude, second = mode->natural * rate;
-        return (extent){segment->amplitude, rate, second, mode->natural * second};
+        const double rate = mode->natural * segment->amplitude;
+        return (extent){segment->amplitude, rate, mode->stiffness * mode->natural * rate};
     }
     const double damping = 2.0 * mode->decay, rate = sqrt(v * v + mode->stiffness * x * x);
     const double second = sqrt(damping * damping + mode->stiffness) * rate;
+    const double third = damping * second + mode->stiffness * rate;
     const double reach = mode->natural > 0.0 ? rate / mode->natural : HUGE_VAL;
-    return (extent){reach, rate, second, damping * second + mode->stiffness * rate};
+    return (extent){reach, rate, damping * third + mode->stiffness * second};
 }
 
-/* How far the displacement of a point may lie off the chord between two samples. */
-static double off_chord(const scanner *s, int k, double step)
+/* ---- how much samples leave open ---- */
+
+/* Between two samples, of a contact's clearance and of its rate. */
+typedef struct {
+    double off_cubic; /* off the cubic that has the values and rates of both */
+    double ripple;    /* of what ripples, which samples leave out */
+    double rate;      /* off the rate of the cubic, ripples and all, times a third of the step */
+} opening;
+
+/* The fourth power of a step times the bound of a fourth derivative is this many times as far as a motion may lie off
+ * the cubic with its values and rates at both ends; times a third of the step its rate lies off by less than this many
+ * times as much. */
+static const double SHARE_OF_FOURTH = 1.0 / 384.0, SHARE_OF_RATE = 1.0265;
+
+/* Is a motion that stays within `reach` let out of samples: is a cubic no better? */
+static bool ripples(double fourth, double share, double reach)
 {
-    const double share = 0.125 * step * step, w = s->flight->angular_frequency;
-    double sum = s->points[k].steady * vi_min(w * w * share, 2.0);
-    for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
-        sum += fabs(s->points[k].shape[j]) * vi_min(s->extent[j].second * share, 2.0 * s->extent[j].reach);
-    }
-    return sum;
+    return fourth * share >= reach;
 }
 
-/* The same of its velocity. */
-static double off_velocity_chord(const scanner *s, int k, double step)
+static opening opening_of(const scanner *s, int k, double step)
 {
-    const double share = 0.125 * step * step, w = s->flight->angular_frequency;
-    double sum = s->points[k].steady * w * vi_min(w * w * share, 2.0);
-    for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
-        sum += fabs(s->points[k].shape[j]) * vi_min(s->extent[j].third * share, 2.0 * s->extent[j].rate);
+    const vi_point *point = &s->points[k];
+    const double w = s->flight->angular_frequency, square = step * step, share = SHARE_OF_FOURTH * square * square;
+    opening o = {0.0, 0.0, 0.0};
+    double speed = 0.0;
+    if (ripples(w * w * w * w, share, 1.0)) {
+        o.ripple = point->steady;
+        speed = point->steady * w;
+    } else {
+        o.off_cubic = point->steady * (w * w * w * w * share);
     }
-    return sum;
+    for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
+        const double shape = fabs(point->shape[j]);
+        const extent *e = &s->extent[j];
+        if (ripples(e->fourth, share, e->reach)) {
+            o.ripple += shape * e->reach;
+            speed += shape * e->rate;
+        } else {
+            o.off_cubic += shape * (e->fourth * share);
+        }
+    }
+    o.rate = SHARE_OF_RATE * o.off_cubic + speed * (step / 3.0);
+    o.ripple += ROUNDING * point->scale;
+    return o;
 }
 
 /* By how much acceleration may bring a contact that leaves its stop back within a step, m/s. */
@@ -130,15 +156,10 @@ static double speed_back(const vi_approach *p, double step)
            + p->bound * (step * step * step / 24.0);
 }
 
-static double margin_of(const scanner *s, int k)
-{
-    return ROUNDING * s->points[k].scale;
-}
-
 /* Does the contact begin on its stop? */
 static bool on_stop(const scanner *s, int k)
 {
-    return s->begins && s->now[k].clearance <= margin_of(s, k);
+    return s->begins && s->now[k].clearance <= ROUNDING * s->points[k].scale;
 }
 
 /* Does it look as if the first interval of this length were cleared, and the next? */
@@ -149,9 +170,10 @@ static bool is_worth(const scanner *s, double step)
             continue;
         }
         const vi_approach *p = &s->now[k];
+        const opening o = opening_of(s, k, step);
         const double left = on_stop(s, k) ? -(p->velocity + speed_back(p, step)) * step
                                           : p->clearance - vi_max(0.0, p->velocity) * step;
-        if (!(left > off_chord(s, k, step) + margin_of(s, k))) {
+        if (!(left > o.off_cubic + 2.0 * o.ripple)) {
             return false;
         }
     }
@@ -168,25 +190,117 @@ static int level_for(const scanner *s, int longest)
     return l;
 }
 
-/* Clearances of a contact at all samples. */
-static void sample(const scanner *s, const vi_scan_level *level, int k, double clearance[VI_SCAN_SAMPLES])
+/* ---- samples ---- */
+
+/* Of one contact, at the instant where the scan is and after 1 to VI_SCAN_SAMPLES steps, without what ripples: the
+ * clearance, and its rate times a third of the step. */
+typedef struct {
+    double clearance[VI_SCAN_SAMPLES + 1], third[VI_SCAN_SAMPLES + 1];
+} samples;
+
+static void sample(const scanner *s, const vi_scan_level *level, int k, samples *out)
 {
     const vi_point *point = &s->points[k];
     const place *at = &s->at;
-    const double c = -point->sign * (point->cosine * at->cosine + point->sine * at->sine);
-    const double n = -point->sign * (point->sine * at->cosine - point->cosine * at->sine);
+    const double w = s->flight->angular_frequency, square = level->step * level->step;
+    const double share = SHARE_OF_FOURTH * square * square, part = level->step / 3.0;
     const double start = point->offset - point->sign * (point->level + point->level_rate * at->u);
     const double rise = -point->sign * point->level_rate * level->step;
+    double c = 0.0, n = 0.0;
+    if (!ripples(w * w * w * w, share, 1.0)) {
+        c = -point->sign * (point->cosine * at->cosine + point->sine * at->sine);
+        n = -point->sign * (point->sine * at->cosine - point->cosine * at->sine);
+    }
+    const double cw = part * w * c, nw = part * w * n;
+    double *restrict clearance = out->clearance + 1, *restrict third = out->third + 1;
+    out->clearance[0] = start + c;
+    out->third[0] = rise / 3.0 + nw;
     for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
         clearance[i] = start + (double)(i + 1) * rise + c * level->cosine[i] + n * level->sine[i];
+        third[i] = rise / 3.0 + nw * level->cosine[i] - cw * level->sine[i];
     }
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
+        if (ripples(s->extent[j].fourth, share, s->extent[j].reach)) {
+            continue;
+        }
         const double weight = -point->sign * point->shape[j], x = weight * at->x[j], v = weight * at->v[j];
+        const double xw = part * x, vw = part * v;
+        out->clearance[0] += x;
+        out->third[0] += vw;
         for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
             clearance[i] += x * level->x_of_x[j][i] + v * level->x_of_v[j][i];
+            third[i] += xw * level->v_of_x[j][i] + vw * level->v_of_v[j][i];
         }
     }
 }
+
+/* What becomes of an interval between two samples. */
+typedef enum { CLEARED, HAS_CONTACT, UNDECIDED } verdict;
+
+/* Of an interval that the cubic does not clear: the contact comes closer all along, or that is not certain. */
+static verdict judge(const samples *at, const opening *o, int i, bool is_off)
+{
+    const double first = at->third[i], last = at->third[i + 1];
+    const double middle = (at->clearance[i + 1] - last) - (at->clearance[i] + first);
+    if (!is_off || !(vi_max(vi_max(first, last), middle) < -o->rate)) {
+        return UNDECIDED;
+    }
+    if (at->clearance[i + 1] < -o->ripple) {
+        return HAS_CONTACT;
+    }
+    return at->clearance[i + 1] > o->ripple ? CLEARED : UNDECIDED;
+}
+
+/* Intervals of a block, from its beginning on, that are cleared of one contact; *next is what becomes of the one after. */
+static int cleared_of(const scanner *s, const vi_scan_level *level, int k, verdict *next)
+{
+    samples at;
+    double lowest[VI_SCAN_SAMPLES]; /* of the points that control the cubic, within whose hull it lies */
+    const opening o = opening_of(s, k, level->step);
+    const double enough = o.off_cubic + o.ripple;
+    sample(s, level, k, &at);
+    for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
+        lowest[i] = vi_min(vi_min(at.clearance[i], at.clearance[i + 1]),
+                           vi_min(at.clearance[i] + at.third[i], at.clearance[i + 1] - at.third[i + 1]));
+    }
+    int i = on_stop(s, k) && -s->now[k].velocity > speed_back(&s->now[k], level->step);
+    *next = CLEARED;
+    for (; i < VI_SCAN_SAMPLES; ++i) {
+        if (lowest[i] > enough) {
+            continue;
+        }
+        const bool is_off = i == 0 && s->begins ? !on_stop(s, k) : at.clearance[i] > o.ripple;
+        *next = judge(&at, &o, i, is_off);
+        if (*next != CLEARED) {
+            break;
+        }
+    }
+    return i;
+}
+
+/* The same of all contacts; of several that are met in one interval none is known to be the first. */
+static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, int *contact)
+{
+    int least = VI_SCAN_SAMPLES;
+    *next = CLEARED;
+    for (int k = 0; k < s->contacts; ++k) {
+        if (!s->looked_for[k]) {
+            continue;
+        }
+        verdict one;
+        const int count = cleared_of(s, level, k, &one);
+        if (count < least) {
+            *next = one;
+            *contact = k;
+        } else if (count == least && one != CLEARED) {
+            *next = UNDECIDED;
+        }
+        least = count < least ? count : least;
+    }
+    return least;
+}
+
+/* ---- from sample to sample ---- */
 
 /* Go on by 1 to VI_SCAN_SAMPLES steps. */
 static void go(place *at, const vi_structure_model *model, const vi_scan_level *level, int steps)
@@ -232,32 +346,6 @@ static void advance(scanner *s, const vi_scan_level *level, int steps)
     }
 }
 
-/* Intervals of a block, from its beginning on, that the chords clear. */
-static int cleared(const scanner *s, const vi_scan_level *level)
-{
-    int least = VI_SCAN_SAMPLES;
-    for (int k = 0; k < s->contacts; ++k) {
-        if (!s->looked_for[k]) {
-            continue;
-        }
-        double clearance[VI_SCAN_SAMPLES];
-        const double enough = off_chord(s, k, level->step) + margin_of(s, k);
-        const bool leaves = on_stop(s, k) && -s->now[k].velocity > speed_back(&s->now[k], level->step);
-        bool free = s->now[k].clearance > enough;
-        int i = 0;
-        sample(s, level, k, clearance);
-        if (leaves) {
-            i = 1;
-            free = clearance[0] > enough;
-        }
-        while (i < least && free && clearance[i] > enough) {
-            ++i;
-        }
-        least = i < least ? i : least;
-    }
-    return least;
-}
-
 /* The zero, between two samples, of the polynomial of fifth order that has the clearances, speeds and accelerations of
  * both: a guess. */
 static double guess(const vi_approach *a, const vi_approach *b, double step)
@@ -283,44 +371,18 @@ static double guess(const vi_approach *a, const vi_approach *b, double step)
     return t * step;
 }
 
-/* What becomes of an interval that the chords do not clear. */
-typedef enum { CLEARED, HAS_CONTACT, UNDECIDED } verdict;
-
-/* The interval of one step where the scan is, for one contact. */
-static verdict judge(const scanner *s, const vi_scan_level *level, const place *end, int k, vi_scan_found *found)
+/* The contact is in the interval after `steps`. */
+static void bracket(const scanner *s, const vi_scan_level *level, int steps, int k, vi_scan_found *found)
 {
-    const vi_approach *a = &s->now[k], b = approach_at(s, end, k);
-    const double margin = margin_of(s, k);
-    if (vi_min(a->clearance, b.clearance) > off_chord(s, k, level->step) + margin) {
-        return CLEARED;
+    place low = s->at, high = s->at;
+    vi_approach at_low = s->now[k];
+    if (steps > 0) {
+        go(&low, s->flight->model, level, steps);
+        at_low = approach_at(s, &low, k);
     }
-    if (!(a->clearance > margin) || !(vi_min(a->velocity, b.velocity) > off_velocity_chord(s, k, level->step))) {
-        return UNDECIDED;
-    }
-    if (b.clearance < -margin) {
-        found->contact = k;
-        found->low = s->at.u;
-        found->high = end->u;
-        found->guess = s->at.u + guess(a, &b, level->step);
-        return HAS_CONTACT;
-    }
-    return b.clearance > margin ? CLEARED : UNDECIDED;
-}
-
-/* The same for all contacts; of several that are met in it none is known to be the first. */
-static verdict judge_all(const scanner *s, const vi_scan_level *level, vi_scan_found *found)
-{
-    verdict all = CLEARED;
-    place end = s->at;
-    go(&end, s->flight->model, level, 1);
-    for (int k = 0; k < s->contacts; ++k) {
-        const verdict one = s->looked_for[k] ? judge(s, level, &end, k, found) : CLEARED;
-        if (one == UNDECIDED || (one == HAS_CONTACT && all == HAS_CONTACT)) {
-            return UNDECIDED;
-        }
-        all = one == HAS_CONTACT ? one : all;
-    }
-    return all;
+    go(&high, s->flight->model, level, steps + 1);
+    const vi_approach at_high = approach_at(s, &high, k);
+    *found = (vi_scan_found){k, low.u, high.u, low.u + guess(&at_low, &at_high, level->step), found->blocks};
 }
 
 static void begin(scanner *s, const vi_flight_instant *from, const vi_approach first[])
@@ -355,31 +417,28 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
     int l = level_for(&s, longest);
     for (found->blocks = 0; found->blocks < MOST_BLOCKS && l >= 0; ++found->blocks) {
         vi_scan_level *level = &scan->level[l];
+        verdict next;
+        int contact;
         if (level->step == 0.0) {
             make(level, scan, flight->model, l);
         }
-        const int steps = cleared(&s, level);
+        const int steps = cleared(&s, level, &next, &contact);
+        if (s.at.u + (double)steps * level->step >= flight->length) {
+            return VI_SCAN_CLEAR;
+        }
+        if (next == HAS_CONTACT) {
+            bracket(&s, level, steps, contact, found);
+            return VI_SCAN_BRACKET;
+        }
         if (steps > 0) {
             advance(&s, level, steps);
         }
-        found->low = s.at.u;
-        if (s.at.u >= flight->length) {
-            return VI_SCAN_CLEAR;
-        }
-        if (steps == VI_SCAN_SAMPLES) {
-            l += l < longest && is_worth(&s, 2.0 * level->step);
-            continue;
-        }
-        const verdict all = judge_all(&s, level, found);
-        if (all == HAS_CONTACT) {
-            return VI_SCAN_BRACKET;
-        }
-        if (all == CLEARED) {
-            advance(&s, level, 1);
-        } else {
+        if (steps < VI_SCAN_SAMPLES) {
             l = level_for(&s, l - 1);
+        } else if (l < longest && is_worth(&s, 2.0 * level->step)) {
+            l += 1;
         }
     }
     found->low = s.at.u;
-    return s.at.u >= flight->length ? VI_SCAN_CLEAR : VI_SCAN_STUCK;
+    return VI_SCAN_STUCK;
 }
