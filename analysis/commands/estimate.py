@@ -170,7 +170,7 @@ def _write(console: Terminal, dataset: xr.Dataset, asked: Estimation) -> None:
         with writing(asked.figure):
             # matplotlib takes half a second to import; estimates alone do not pay for it.
             from vibroimpact.analysis.figures import save
-            from vibroimpact.analysis.figures.estimates import draw_estimates
+            from vibroimpact.analysis.figures.measured.estimates import draw_estimates
 
             save(draw_estimates(dataset), asked.figure)
         console.print(f"Figure written to {asked.figure}.")

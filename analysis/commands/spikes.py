@@ -145,7 +145,7 @@ def _draw(report: SpikeReport | None, dataset: xr.Dataset, path: Path) -> None:
     """Write the figure of the spikes, or that of the intervals where there are only these."""
     # matplotlib takes half a second to import; spikes alone do not pay for it.
     from vibroimpact.analysis import figures
-    from vibroimpact.analysis.figures.intervals import draw_intervals
-    from vibroimpact.analysis.figures.spikes import draw_spikes
+    from vibroimpact.analysis.figures.measured.intervals import draw_intervals
+    from vibroimpact.analysis.figures.measured.spikes import draw_spikes
 
     figures.save(draw_intervals(dataset) if report is None else draw_spikes(report), path)

@@ -18,10 +18,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.kinds import KINDS, draw_view
-from vibroimpact.analysis.figures.ladder import convergence, work_precision
+from vibroimpact.analysis.figures.measured.planned_drive import draw_planned_drive
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label, laid_out, save
-from vibroimpact.analysis.figures.planned_drive import draw_planned_drive
-from vibroimpact.analysis.figures.sweeps import largest_impact_velocity
+from vibroimpact.analysis.figures.study.ladder import convergence, work_precision
+from vibroimpact.analysis.figures.sweep.diagrams import largest_impact_velocity
 from vibroimpact.analysis.figures.window import View, Window
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError

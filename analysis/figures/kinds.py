@@ -11,44 +11,44 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.accuracy import draw_accuracy
-from vibroimpact.analysis.figures.basins import draw_basins
-from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
-from vibroimpact.analysis.figures.classes import KIND as CLASS_KIND
-from vibroimpact.analysis.figures.classes import draw_classes
-from vibroimpact.analysis.figures.control import draw_control
-from vibroimpact.analysis.figures.effects import draw_effects
-from vibroimpact.analysis.figures.estimates import draw_estimates
-from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
-from vibroimpact.analysis.figures.impact_frequency import draw_impact_frequency
-from vibroimpact.analysis.figures.intervals import draw_intervals
-from vibroimpact.analysis.figures.ladder import convergence, work_precision
-from vibroimpact.analysis.figures.lyapunov import draw_lyapunov
-from vibroimpact.analysis.figures.maps import draw_maps
-from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
-from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
-from vibroimpact.analysis.figures.orbit_energies import draw_orbit_energies
-from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait, draw_return_map
-from vibroimpact.analysis.figures.recordings import draw_recording
-from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
-from vibroimpact.analysis.figures.resonances import draw_resonances
-from vibroimpact.analysis.figures.runs import draw_run
-from vibroimpact.analysis.figures.scores import draw_scores
-from vibroimpact.analysis.figures.sensitivity import draw_sensitivity
-from vibroimpact.analysis.figures.series import sampled_variables
-from vibroimpact.analysis.figures.spectra import (
+from vibroimpact.analysis.figures.measured.estimates import draw_estimates
+from vibroimpact.analysis.figures.measured.intervals import draw_intervals
+from vibroimpact.analysis.figures.measured.recordings import draw_recording
+from vibroimpact.analysis.figures.measured.replay import draw_replay, recordings_of
+from vibroimpact.analysis.figures.measured.spectra import (
     draw_recording_spectrum,
     draw_replay_spectrum,
     draw_run_spectrum,
 )
-from vibroimpact.analysis.figures.strobe import draw_strobe
-from vibroimpact.analysis.figures.sweeps import (
+from vibroimpact.analysis.figures.motion.modal import draw_energies, draw_shapes
+from vibroimpact.analysis.figures.motion.portraits import draw_impact_map, draw_portrait, draw_return_map
+from vibroimpact.analysis.figures.motion.runs import draw_run
+from vibroimpact.analysis.figures.motion.series import sampled_variables
+from vibroimpact.analysis.figures.motion.strobe import draw_strobe
+from vibroimpact.analysis.figures.orbits.basins import draw_basins
+from vibroimpact.analysis.figures.orbits.branches import BRANCH, draw_branches
+from vibroimpact.analysis.figures.orbits.control import draw_control
+from vibroimpact.analysis.figures.orbits.lyapunov import draw_lyapunov
+from vibroimpact.analysis.figures.orbits.maps import draw_maps
+from vibroimpact.analysis.figures.orbits.orbit_energies import draw_orbit_energies
+from vibroimpact.analysis.figures.orbits.resonances import draw_resonances
+from vibroimpact.analysis.figures.study.accuracy import draw_accuracy
+from vibroimpact.analysis.figures.study.effects import draw_effects
+from vibroimpact.analysis.figures.study.hard_cases import draw_hard_cases
+from vibroimpact.analysis.figures.study.ladder import convergence, work_precision
+from vibroimpact.analysis.figures.study.scores import draw_scores
+from vibroimpact.analysis.figures.study.sensitivity import draw_sensitivity
+from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
+from vibroimpact.analysis.figures.sweep.classes import draw_classes
+from vibroimpact.analysis.figures.sweep.diagrams import (
     draw_bifurcation,
     draw_impacts_per_period,
     draw_map,
     varied,
     wrong_sweep,
 )
+from vibroimpact.analysis.figures.sweep.impact_frequency import draw_impact_frequency
+from vibroimpact.analysis.figures.sweep.measured_sweep import draw_measured_sweep
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError

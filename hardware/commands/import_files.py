@@ -35,7 +35,7 @@ def import_into(
     if figure is not None:
         # matplotlib takes half a second to import; an import alone does not pay for it.
         from vibroimpact.analysis import figures
-        from vibroimpact.analysis.figures.recordings import draw_recording
+        from vibroimpact.analysis.figures.measured.recordings import draw_recording
 
         with writing(figure):
             figures.save(draw_recording(recording), figure)

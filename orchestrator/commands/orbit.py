@@ -71,7 +71,7 @@ def show_orbits(
     _write(scene, physical, output)
     if figure is not None and orbits:
         from vibroimpact.analysis import figures  # half a second, which a table needs not
-        from vibroimpact.analysis.figures.orbits import draw_orbits
+        from vibroimpact.analysis.figures.orbits.portrait import draw_orbits
 
         with writing(figure):
             figures.save(draw_orbits(orbits, scene.units), figure)

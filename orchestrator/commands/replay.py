@@ -162,7 +162,7 @@ def _write(dataset: xr.Dataset, output: Path, figure: Path | None) -> None:
         if figure is not None:
             # matplotlib takes half a second to import; a replay alone does not pay for it.
             from vibroimpact.analysis import figures
-            from vibroimpact.analysis.figures.replay import draw_replay
+            from vibroimpact.analysis.figures.measured.replay import draw_replay
 
             figures.save(draw_replay(dataset), figure)
     except OSError as error:

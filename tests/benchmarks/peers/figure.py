@@ -1,4 +1,4 @@
-"""Error against cost, a panel for each problem, in the style of `analysis/figures/accuracy.py`."""
+"""Error against cost, a panel for each problem, in the style of `analysis/figures/study/accuracy.py`."""
 
 from __future__ import annotations
 

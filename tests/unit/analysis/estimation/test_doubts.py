@@ -14,7 +14,7 @@ from vibroimpact.analysis.estimation import Forcing, Known, estimate_impacts, im
 from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.physics import Coordinates, Parameters
 from vibroimpact.analysis.estimation.remarks import _of_contradictions
-from vibroimpact.analysis.figures.estimates import draw_estimates
+from vibroimpact.analysis.figures.measured.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
 
 pytestmark = pytest.mark.slow

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.kinds import fitting
+from vibroimpact.analysis.figures.measured.intervals import draw_intervals
 from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset

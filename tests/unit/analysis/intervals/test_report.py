@@ -11,7 +11,7 @@ from rich.console import Console
 
 from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.analysis.figures.intervals import draw_intervals
+from vibroimpact.analysis.figures.measured.intervals import draw_intervals
 from vibroimpact.analysis.intervals import interval_report, print_intervals, seams
 from vibroimpact.analysis.intervals.dimension import verdict
 from vibroimpact.fmus.errors import EstimationError, UsageError

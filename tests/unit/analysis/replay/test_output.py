@@ -14,7 +14,7 @@ from support.replay_signals import FREQUENCY, HIT, INTERVAL, channel, clock, rin
 
 from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.analysis.figures.replay import draw_replay
+from vibroimpact.analysis.figures.measured.replay import draw_replay
 from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.analysis.replay import Comparison, compare, comparison_dataset, print_comparison
 from vibroimpact.fmus.errors import DatasetError

@@ -11,6 +11,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.measured.recordings import MOST_PANELS, short_name, spans_of
+from vibroimpact.analysis.figures.measured.replay import comparison_of
+from vibroimpact.analysis.figures.motion.series import sampled_variables, samples_within
 from vibroimpact.analysis.figures.page import (
     LINE,
     MARK,
@@ -21,10 +24,7 @@ from vibroimpact.analysis.figures.page import (
     page_style,
     title,
 )
-from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name, spans_of
-from vibroimpact.analysis.figures.replay import comparison_of
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
-from vibroimpact.analysis.figures.series import sampled_variables, samples_within
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.analysis.spectral_density import spectral_density

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, canvas, label, legend_outside, page_style
-from vibroimpact.analysis.figures.sweeps import is_logarithmic
+from vibroimpact.analysis.figures.sweep.diagrams import is_logarithmic
 from vibroimpact.fmus.errors import DatasetError
 
 _NEEDED = ("first_order", "total_order", "first_order_interval", "total_order_interval", "blocks")

@@ -9,8 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import LINE, MARK, canvas, page_style
+from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 
 _NEEDED = ("share", "seconds", "run_seconds", "name", "changes")
 _BAR_MM = 9

@@ -12,6 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.dataset.schema import scene_of
+from vibroimpact.analysis.figures.motion.series import (
+    first_after_impacts,
+    impacts_within,
+    samples_within,
+    with_gaps,
+)
 from vibroimpact.analysis.figures.page import (
     COLOURS,
     LINE,
@@ -27,7 +33,6 @@ from vibroimpact.analysis.figures.page import (
     unit_symbol,
 )
 from vibroimpact.analysis.figures.scene_text import limits, swept_keys, table
-from vibroimpact.analysis.figures.series import first_after_impacts, impacts_within, samples_within, with_gaps
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.dataset.schema import scene_of
 from vibroimpact.analysis.figures.page import COLOURS, STOP, Floats, canvas, label, legend_outside
 from vibroimpact.analysis.figures.scene_text import table
-from vibroimpact.analysis.figures.sweeps import varied, wrong_sweep
+from vibroimpact.analysis.figures.sweep.diagrams import varied, wrong_sweep
 from vibroimpact.analysis.orbits.resonances import frequency_shift
 from vibroimpact.fmus.errors import DatasetError
 

@@ -11,6 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from vibroimpact.analysis.figures.motion.series import draw_series, sampled_variables, selected, time_part
+from vibroimpact.analysis.figures.motion.strobe import draw_section
 from vibroimpact.analysis.figures.page import (
     LINE,
     MARK,
@@ -22,8 +24,6 @@ from vibroimpact.analysis.figures.page import (
     legend_outside,
 )
 from vibroimpact.analysis.figures.scene_text import ShownStop, observed_stops, stops
-from vibroimpact.analysis.figures.series import draw_series, sampled_variables, selected, time_part
-from vibroimpact.analysis.figures.strobe import draw_section
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option

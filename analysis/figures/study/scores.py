@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label
-from vibroimpact.analysis.figures.sweeps import varied
+from vibroimpact.analysis.figures.sweep.diagrams import varied
 from vibroimpact.fmus.errors import DatasetError
 
 #: More lines than this in a panel cannot be told apart.

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.dataset.schema import MeasurementFlag
 from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside
-from vibroimpact.analysis.figures.sweeps import is_logarithmic, varied, wrong_sweep
+from vibroimpact.analysis.figures.sweep.diagrams import is_logarithmic, varied, wrong_sweep
 from vibroimpact.fmus.errors import DatasetError
 
 _FLAGS = "measurement_flags"

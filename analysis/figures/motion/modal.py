@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.motion.series import first_after_impacts, samples_within, with_gaps
 from vibroimpact.analysis.figures.page import COLOURS, LINE, STOP, canvas, label, legend_outside, unit_symbol
-from vibroimpact.analysis.figures.series import first_after_impacts, samples_within, with_gaps
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 

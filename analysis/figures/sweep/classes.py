@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.figures.page import canvas, label
-from vibroimpact.analysis.figures.sweeps import (
+from vibroimpact.analysis.figures.sweep.diagrams import (
     edges,
     in_order_of_the_scene,
     is_logarithmic,

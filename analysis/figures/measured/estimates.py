@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.impact_estimate import draw_impact_estimate, limit
+from vibroimpact.analysis.figures.measured.impact_estimate import draw_impact_estimate, limit
 from vibroimpact.analysis.figures.page import LINE, MARK, STOP, canvas, legend_above, page_style, unit_symbol
 from vibroimpact.fmus.errors import DatasetError
 

@@ -11,7 +11,13 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside
-from vibroimpact.analysis.figures.sweeps import draw_map, edges, in_order_of_the_scene, varied, wrong_sweep
+from vibroimpact.analysis.figures.sweep.diagrams import (
+    draw_map,
+    edges,
+    in_order_of_the_scene,
+    varied,
+    wrong_sweep,
+)
 from vibroimpact.fmus.errors import DatasetError
 
 BRANCH = "orbit_branch"

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.measured.recordings import outline
 from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, legend_above, page_style
-from vibroimpact.analysis.figures.recordings import outline
 from vibroimpact.analysis.spikes.report import SpikeReport
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
 

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
+from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 
 _MARKERS = "osD^vP<"
 """One more than there are colours: that many times as many ways look different."""

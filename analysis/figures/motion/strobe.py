@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.figures.page import LINE, STOP_LINE, canvas, label
 from vibroimpact.analysis.figures.scene_text import observed_stops
-from vibroimpact.analysis.figures.sweeps import draw_diagram, one_value, varied
+from vibroimpact.analysis.figures.sweep.diagrams import draw_diagram, one_value, varied
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 

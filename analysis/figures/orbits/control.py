@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.branches import draw_below
+from vibroimpact.analysis.figures.orbits.branches import draw_below
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
-from vibroimpact.analysis.figures.sweeps import varied, wrong_sweep
+from vibroimpact.analysis.figures.sweep.diagrams import varied, wrong_sweep
 from vibroimpact.fmus.errors import DatasetError
 
 _PERCENT = 100.0

@@ -8,7 +8,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
-from vibroimpact.analysis.figures.sweeps import edges
+from vibroimpact.analysis.figures.sweep.diagrams import edges
 
 _COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
 _MARKS = "osD^vPX*"

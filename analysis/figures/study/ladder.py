@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label, legend_above, page_style
+from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 from vibroimpact.analysis.landmarks import observed_order
 
 _QUANTITIES = ("error", "energy_drift")

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.measured.recordings import short_name
 from vibroimpact.analysis.figures.page import (
     COLOURS,
     LINE,
@@ -21,7 +22,6 @@ from vibroimpact.analysis.figures.page import (
     page_style,
     unit_symbol,
 )
-from vibroimpact.analysis.figures.recordings import short_name
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError

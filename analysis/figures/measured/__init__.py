@@ -1,0 +1,1 @@
+"""What was measured, and what is read off it: recordings, replays, spectra, spikes, estimates."""

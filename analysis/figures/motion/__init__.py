@@ -1,0 +1,1 @@
+"""One motion: its time series, its planes, its modes."""

@@ -1,0 +1,1 @@
+"""Periodic orbits and what is around them: branches, basins, maps, exponents, resonances."""

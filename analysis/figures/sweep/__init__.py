@@ -1,0 +1,1 @@
+"""Motions along a sweep, or over two parameters."""
