@@ -53,6 +53,12 @@ bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant
 /* Time of an instant, s, rounded once. */
 double vi_clock_time(const vi_clock *clock, vi_instant instant);
 
+/* Is instant `a` before `b`? */
+static inline bool vi_clock_is_before(vi_instant a, vi_instant b)
+{
+    return a.periods < b.periods || (a.periods == b.periods && (b.rest - a.rest) + (b.rest_low - a.rest_low) > 0.0);
+}
+
 /* Seconds from `a` to `b`. */
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b);
 

@@ -134,11 +134,12 @@ void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], 
 }
 
 void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instant, double moment, double q[],
-                        double p[])
+                        double p[], vi_phase *phase)
 {
     const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment / 3.0;
     const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn / 6.0);
     const double c = instant->cosine * less - instant->sine * more, s = instant->sine * less + instant->cosine * more;
+    *phase = (vi_phase){flight->phase.angle + w * (instant->u + moment), c, s};
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
         const vi_mode *mode = segment->mode;

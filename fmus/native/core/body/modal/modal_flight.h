@@ -66,8 +66,9 @@ bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *larg
 /* Modal displacements and velocities after u, the forcing phase there being known (exactly, for long flights). */
 void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], double p[]);
 
-/* The same a moment, so short that its fourth power is nothing, after (or before) an instant: no evaluation. */
+/* The same a moment, so short that its fourth power is nothing, after (or before) an instant, and the forcing phase: no
+ * evaluation. */
 void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instant, double moment, double q[],
-                        double p[]);
+                        double p[], vi_phase *phase);
 
 #endif

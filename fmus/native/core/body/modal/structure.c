@@ -56,16 +56,21 @@ static void record_period(const vi_structure *s)
                      vi_structure_at(s->model, s->model->observed, s->state->p));
 }
 
+/* For how long a contact just released stays on its stop, s. */
+static double one_release(const vi_structure *s)
+{
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
+    return ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, s->state->now)));
+}
+
 /* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
 static void move(const vi_structure *s, double u, vi_ending end, vi_instant target)
 {
     vi_structure_state *state = s->state;
     const vi_instant after = end == VI_ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
-    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
-    const double one = ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, state->now)));
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
         if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]
-            && (u <= one || vi_structure_only_touches(s, k))) {
+            && (u <= one_release(s) || vi_structure_only_touches(s, k))) {
             continue; /* those that others hold stay, however long */
         }
         if (state->status[k] == VI_CONTACT_TOUCHING) {
@@ -90,12 +95,41 @@ static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
     return !flight->series && !s->record->extrema && !s->record->periods && !s->state->follow_energies;
 }
 
+/* Is it certain, whatever the acceleration, that no contact is about to meet its stop or slow to leave it? */
+static bool bounces_high(const vi_structure *s)
+{
+    const vi_structure_model *model = s->model;
+    const double time = 1.0 / model->fastest;
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        if (s->state->held_rate[j] != 0.0) {
+            return false;
+        }
+    }
+    for (int k = 0; k < model->contacts; ++k) {
+        if (!vi_structure_watched(s, k)) {
+            continue;
+        }
+        const double clearance = vi_max(0.0, vi_structure_clearance(s, k)), v = vi_structure_approach(s, k);
+        const double most = model->fastest * vi_structure_velocity_size(s, k); /* acceleration */
+        const double flight = vi_parabola_root(clearance, v, most);
+        const bool lingers = s->state->status[k] == VI_CONTACT_TOUCHING
+                             && fabs(v) * time < VI_LINGERING * vi_structure_displacement_size(s, k);
+        if (lingers || !(flight * model->fastest > 2.0 * VI_LOW_BOUNCE)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* How long to follow the body from where it is, since a contact is about to meet its stop or slow to leave it, s;
  * HUGE_VAL when that is not needed. */
 static double low_bounce(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
     double acceleration[VI_MODES], force[VI_PORTS], shortest = HUGE_VAL;
+    if (bounces_high(s)) {
+        return HUGE_VAL;
+    }
     vi_structure_accelerate(s, acceleration, force);
     for (int k = 0; k < model->contacts; ++k) {
         if (!vi_structure_watched(s, k)) {
@@ -145,6 +179,7 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_flight flight;
     vi_point points[VI_PORTS];
     vi_search_found found;
+    vi_phase phase;
     vi_structure_held_now(s, held);
     vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
                     vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
@@ -168,8 +203,9 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     if (state->follow_energies) {
         vi_energies_of_flight(s, &flight, held, u);
     }
-    if (meets && isfinite(found.moment)) {
-        vi_flight_end_near(&flight, &found.now, found.moment, state->q, state->p);
+    const bool near = meets && isfinite(found.moment);
+    if (near) {
+        vi_flight_end_near(&flight, &found.now, found.moment, state->q, state->p, &phase);
     } else {
         vi_flight_end(&flight, u, flight.phase.angle + flight.angular_frequency * u, state->q, state->p);
     }
@@ -180,6 +216,9 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     }
     forget_origins(s);
     move(s, u, vi_ending_at(end, u, length, room), target);
+    if (near) {
+        vi_structure_phase_is(s, phase);
+    }
     vi_structure_meet(s, found.contact, stops_here(s, target, request));
     return true;
 }
@@ -343,7 +382,7 @@ vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, co
     const bool ends_when_full = request->early_return && !vi_record_full(s->record);
     vi_step_result result = VI_STEP_DONE;
     while (result == VI_STEP_DONE && !s->state->pending
-           && vi_clock_elapsed(&s->model->clock, s->state->now, target) > 0.0) {
+           && vi_clock_is_before(s->state->now, target)) {
         result = ends_when_full && vi_record_full(s->record) ? VI_STEP_RECORD_FULL : move_on(s, target, request);
     }
     return vi_budget_end(&s->state->budget, result == VI_STEP_DONE && s->state->pending ? VI_STEP_CONTACT : result);

@@ -78,16 +78,18 @@ void vi_structure_signed(const vi_structure *s, double matrix[VI_PORTS][VI_PORTS
 void vi_structure_accelerate(const vi_structure *s, double acceleration[], double force[])
 {
     const vi_structure_model *model = s->model;
-    double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, hold[VI_PORTS];
-    int held[VI_PORTS] = {0}, any = 0;
+    double g[VI_PORTS][VI_PORTS], b[VI_PORTS], hold[VI_PORTS];
+    int held[VI_PORTS], any = 0;
     vi_structure_accelerate_freely(s, acceleration, force);
     for (int k = 0; k < model->contacts; ++k) {
         held[k] = s->state->status[k] == VI_CONTACT_HELD;
         any |= held[k];
-        b[k] = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
     }
     if (!any) {
         return;
+    }
+    for (int k = 0; k < model->contacts; ++k) {
+        b[k] = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
     }
     vi_structure_signed(s, s->model->compliance, g);
     vi_solve_active(model->contacts, g, b, held, hold);

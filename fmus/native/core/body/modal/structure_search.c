@@ -30,7 +30,8 @@ bool vi_search_is_idle(const vi_structure *s, const vi_flight *flight, const vi_
     for (int k = 0; k < s->model->contacts; ++k) {
         double reach;
         if (vi_structure_watched(s, k)
-            && (!vi_point_reach(&points[k], flight, &reach) || !(reach < points[k].sign * s->contacts[k].position))) {
+            && (s->state->status[k] == VI_CONTACT_TOUCHING || !vi_point_reach(&points[k], flight, &reach)
+                || !(reach < points[k].sign * s->contacts[k].position))) {
             return false;
         }
     }

@@ -88,6 +88,14 @@ vi_phase vi_structure_phase(const vi_structure *s)
     return s->state->phase;
 }
 
+void vi_structure_phase_is(const vi_structure *s, vi_phase phase)
+{
+    const double angle = s->model->clock.angular_frequency * s->state->now.rest;
+    if (angle != 0.0) { /* a period begins with phase 0 exactly */
+        s->state->phase = (vi_phase){angle, phase.cosine, phase.sine};
+    }
+}
+
 void vi_structure_held_now(const vi_structure *s, double held[])
 {
     const vi_structure_state *state = s->state;

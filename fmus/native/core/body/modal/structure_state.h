@@ -198,6 +198,10 @@ static inline double vi_structure_direction(const vi_structure *s, int k)
 }
 
 vi_phase vi_structure_phase(const vi_structure *s);
+
+/* What the forcing phase has been found to be at this instant, but for whole turns and the rounding of its angle. */
+void vi_structure_phase_is(const vi_structure *s, vi_phase phase);
+
 void vi_structure_held_now(const vi_structure *s, double held[]);
 
 /* sign * shape . p: speed towards the stop, m/s */
