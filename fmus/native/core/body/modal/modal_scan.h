@@ -1,9 +1,10 @@
 /* How far a flight has no contact for certain, told by samples of it at equal steps.
  *
  * A sample costs a few products, since the propagators over one to VI_SCAN_SAMPLES steps are made once and kept. Between
- * two samples a point lies no further beyond the chord than M step^2 / 8, M being a bound of its acceleration (or twice
- * its displacement, of a mode that ripples): where the clearance at both ends is larger there is no contact. In the
- * interval that is not cleared so, a speed towards the stop that has no zero tells that there is one contact or none.
+ * two samples a point lies no further than M step^4 / 384 off the cubic that has the values and rates of both, M being a
+ * bound of its fourth derivative; modes that ripple by less than that are let out, and their ripple is taken off. Where
+ * the points that control the cubic are clear by more there is no contact. In the interval that is not cleared so, a
+ * speed towards the stop that has no zero tells that there is one contact or none.
  * equations.md 2
  */
 #ifndef VIBROIMPACT_MODAL_SCAN_H
