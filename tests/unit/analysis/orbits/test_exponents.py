@@ -28,9 +28,10 @@ CHAIN: dict[str, Any] = {
 
 
 def test_the_known_exponent_of_a_chaotic_oscillator() -> None:
-    found = vi.lyapunov(vi.run(CHAOS))
+    # of the last bits of an engine any part of the motion hangs: so many periods tell it to a quarter of what is allowed
+    found = vi.lyapunov(vi.run({**CHAOS, "record": CHAOS["record"] | {"recorded_periods": 200_000}}))
     assert float(found.lyapunov_exponent[0]) == pytest.approx(0.322, abs=0.006)
-    assert float(found.standard_error[0]) < 0.005
+    assert float(found.standard_error[0]) < 0.002
     assert float(found.sum_error) < 1e-12
     assert 1.0 < float(found.dimension) < 2.0
 
