@@ -159,9 +159,9 @@ class Rows:
 
 def peaking(modes: int) -> tuple[Array, Array, Array]:
     """Return frequencies, shape and start; shape . q is largest, 1, at the time pi, and every 2 pi later."""
-    natural = 2.0 * np.arange(modes) + 1.0
-    shape = np.where(np.arange(modes) % 2 == 0, 1.0, -1.0) / (1.0 + np.arange(modes))
-    share = 1.0 / natural**2
+    natural: Array = 2.0 * np.arange(modes, dtype=np.float64) + 1.0
+    shape: Array = np.where(np.arange(modes) % 2 == 0, 1.0, -1.0) / (1.0 + np.arange(modes, dtype=np.float64))
+    share: Array = 1.0 / natural**2
     return natural, shape, -share / share.sum() / shape
 
 
