@@ -20,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from vibroimpact.fmus.errors import ComponentError, VibroimpactError
-from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, compile_library
+from vibroimpact.fmus.packaging.compiler import ACROSS_FILES, LANGUAGE, WARNINGS, compile_library
 from vibroimpact.fmus.packaging.description import (
     ComponentDescription,
     c_header,
@@ -116,7 +116,7 @@ def is_current(output: Path = BUILT, *, native: Path = NATIVE) -> bool:
 
 def fingerprint(native: Path = NATIVE) -> str:
     """Return the SHA-256 of everything that an FMU is made from, except the compiler."""
-    digest = hashlib.sha256(repr((LANGUAGE, WARNINGS, sys.platform)).encode())
+    digest = hashlib.sha256(repr((LANGUAGE, WARNINGS, ACROSS_FILES, sys.platform)).encode())
     sources = [p for p in native.rglob("*") if p.suffix in {".c", ".h", ".toml", ".md"}]
     builders = [*(HERE / "description").glob("*.py"), HERE / "build.py"]
     # by places inside the folders: where these lie does not matter, where a file lies in them does
@@ -183,9 +183,16 @@ def compile_component(
         generated = Path(folder)
         (generated / header_name(component)).write_text(c_header(component), encoding="utf-8")
         library = generated / f"{component.name}{library_suffix() if platform is None else platform.suffix}"
-        include = [*shared, own, generated, fmi_headers()]
+        include, defined = [*shared, own, generated, fmi_headers()], sizes(component)
         compile_library(
-            library, sources, include, definitions=sizes(component), strict=strict, platform=platform
+            library,
+            sources,
+            include,
+            definitions=defined,
+            # of one mode, most of what an impact costs are calls
+            across_files=defined["VI_ONLY_MODES"] == 1,
+            strict=strict,
+            platform=platform,
         )
         return library.read_bytes()
 

@@ -24,6 +24,8 @@ ON_PATH = ("cc", "gcc", "clang")
 # contraction off: a * b + c is rounded twice everywhere, so all machines give the same bits
 LANGUAGE = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion")
+#: Optimization across files, which not every linker knows, and the level at which it gains most.
+ACROSS_FILES = ("-O3", "-flto=auto")
 
 
 def find_compiler() -> tuple[str, ...]:
@@ -60,6 +62,7 @@ def compile_library(
     *,
     definitions: Mapping[str, int] = MappingProxyType({}),
     export_all: bool = False,
+    across_files: bool = False,
     strict: bool = True,
     platform: Platform | None = None,
 ) -> None:
@@ -75,6 +78,8 @@ def compile_library(
         Macros and their values.
     export_all : bool
         Export every function, not only those marked for export.
+    across_files : bool
+        Optimize across files where compiler and linker can; takes half as long again.
     strict : bool
         Warnings are errors; off where users build, since a newer compiler may know new warnings.
     platform : Platform, optional
@@ -87,6 +92,8 @@ def compile_library(
     """
     compiler = find_compiler() if platform is None else zig_compiler()
     options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler, platform)]
+    if across_files and _works((*compiler, *_platform_options(compiler, platform), *ACROSS_FILES)):
+        options += ACROSS_FILES
     options += [] if export_all else ["-fvisibility=hidden"]
     options += [f"-D{name}={value}" for name, value in definitions.items()]
     folders = [f"-I{folder}" for folder in include]

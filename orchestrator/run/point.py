@@ -47,7 +47,7 @@ from vibroimpact.orchestrator.scene.models import Record
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measured_run import MeasuredRun
 
-ENGINE = 2
+ENGINE = 3
 """Version of what follows our bodies, in C; with another one results differ, and no campaign mixes two."""
 
 TWO_PI = 2.0 * math.pi

@@ -213,41 +213,49 @@ LANES_INLINE void expand(const vi_lane_group *g, int at, const candidate *cell, 
     }
 }
 
-/* What the polynomial adds to its first term, and its slope, after a share of the cell. */
+/* What the polynomial adds to its first term, and its slope, after a share of the cell. Odd and even powers are summed apart:
+ * half as many operations wait for one another. */
 LANES_INLINE void follow(const vector term[], vector share, vector *added, vector *slope)
 {
-    vector x = term[VI_LANE_ORDER], v = (double)VI_LANE_ORDER * x;
+    const vector square = share * share;
+    vector odd = term[VI_LANE_ORDER - 1], odd_slope = (double)(VI_LANE_ORDER - 1) * odd;
+    vector even = term[VI_LANE_ORDER], even_slope = (double)VI_LANE_ORDER * even;
 #pragma GCC unroll 16
-    for (int n = VI_LANE_ORDER - 1; n >= 1; --n) {
-        x = x * share + term[n];
-        v = v * share + (double)n * term[n];
+    for (int n = VI_LANE_ORDER - 3; n >= 1; n -= 2) {
+        odd = odd * square + term[n];
+        odd_slope = odd_slope * square + (double)n * term[n];
+        even = even * square + term[n + 1];
+        even_slope = even_slope * square + (double)(n + 1) * term[n + 1];
     }
-    *added = x * share;
-    *slope = v;
+    *added = share * (odd + share * even);
+    *slope = odd_slope + share * even_slope;
 }
 
 /* One step towards the zero of y + sign * (what the polynomial adds), of third order (Chebyshev's). */
 LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
 {
-    vector x = term[VI_LANE_ORDER], v = x * 0.0, a = v;
+    const int last = VI_LANE_ORDER;
+    const vector square = share * share;
+    vector added, slope, odd = (double)((last - 1) * (last - 2) / 2) * term[last - 1];
+    vector even = (double)(last * (last - 1) / 2) * term[last];
 #pragma GCC unroll 16
-    for (int n = VI_LANE_ORDER - 1; n >= 1; --n) {
-        a = a * share + v;
-        v = v * share + x;
-        x = x * share + term[n];
+    for (int n = last - 3; n >= 3; n -= 2) {
+        odd = odd * square + (double)(n * (n - 1) / 2) * term[n];
+        even = even * square + (double)((n + 1) * n / 2) * term[n + 1];
     }
-    /* of the polynomial over its share: what is left is one order lower */
-    const vector slope = v * share + x, bend = a * share + v;
-    const vector step = (y + sign * (x * share)) / (sign * slope);
-    return share - step * (1.0 + step * (bend / slope));
+    follow(term, share, &added, &slope);
+    const vector bend = (even * square + term[2]) + share * odd; /* half the second derivative */
+    const vector inverse = 1.0 / slope, step = (sign * y + added) * inverse;
+    return share - step * (1.0 + step * (bend * inverse));
 }
 
 /* Where a rising cubic's inverse has its zero: the first guess of the contact. */
 LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end_slope, vector length)
 {
     const vector rise = end_y - y, t = -y / rise, back = 1.0 - t;
-    const vector mean = rise / length;
-    const vector x = t + t * back * ((mean / slope - 1.0) * back - (mean / end_slope - 1.0) * t);
+    /* slopes of the inverse at both ends, of which the line has 1 */
+    const vector inverse = rise / (length * (slope * end_slope));
+    const vector x = t + t * back * ((inverse * end_slope - 1.0) * back - (inverse * slope - 1.0) * t);
     return length * smaller(larger(x, all(0.0)), all(1.0));
 }
 

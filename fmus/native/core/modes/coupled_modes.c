@@ -147,7 +147,7 @@ static void look_at_contacts(const vi_pressed_body *body, vi_coupled_work *work)
 static void couple(const vi_pressed_body *body, vi_coupled_work *work)
 {
     for (int i = 0; i < work->real.rank; ++i) {
-        double drag[VI_MODES];
+        double drag[VI_MODES] = {0.0};
         for (int j = 0; j < body->modes; ++j) {
             drag[j] = vi_pressed_drag(body, j, work->shape[i]);
         }

@@ -18,6 +18,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.campaign.manifest import read_manifest, write_manifest
+from vibroimpact.orchestrator.run.point import ENGINE
 
 BODY = """
 [body]
@@ -62,7 +63,7 @@ def test_a_campaign_in_lanes_that_is_interrupted_has_the_bits_of_one_that_is_not
     assert campaign_here(monkeypatch, text, tmp_path / "cut", runner=DEFAULT_RUNNER).resumed > 0
     assert_same_rows(whole.dataset, tmp_path / "cut" / "dataset.nc")
     rows = read_flat(whole.dataset)
-    assert (rows.attrs["execution"], rows.attrs["engine_version"]) == ("lanes", 2)
+    assert (rows.attrs["execution"], rows.attrs["engine_version"]) == ("lanes", ENGINE)
     assert rows.attrs["engine"].startswith("lanes, many points at once: Oscillator")
     assert set(rows.outcome.values) == {0}
     assert (rows.impact_count.values > 0).any()
@@ -121,6 +122,6 @@ def test_a_half_done_campaign_of_another_engine_is_refused_by_one_clear_error(
     assert manifest is not None
     write_manifest(path, scene_of(MAP), replace(manifest.identity, engine=1), manifest.runs)
     parts = sorted((tmp_path / "parts").iterdir())
-    with pytest.raises(UsageError, match=r"engine was 1, is 2\. Results of two kinds are never mixed"):
+    with pytest.raises(UsageError, match=rf"engine was 1, is {ENGINE}\. Results of two kinds are never mixed"):
         campaign_here(monkeypatch, MAP, tmp_path, runner=DEFAULT_RUNNER)
     assert sorted((tmp_path / "parts").iterdir()) == parts

@@ -158,7 +158,7 @@ static void give_impulses(const vi_structure *s, const double impulse[], const d
 static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_PORTS], const double b[],
                    const double p[], double more[])
 {
-    double left[VI_PORTS];
+    double left[VI_PORTS] = {0.0};
     int active[VI_PORTS] = {0};
     for (int i = 0; i < n; ++i) {
         double sum = b[i], rounding = 0.0;
