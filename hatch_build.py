@@ -35,7 +35,7 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile the FMUs: into the wheel, or into the checkout for an editable install."""
         self._make_importable()
-        from vibroimpact.fmus.packaging.build import BUILT, build, build_platforms
+        from vibroimpact.fmus.packaging.build import BUILT, build, build_platforms, is_current
 
         # strict is for the project's own machines: a newer compiler's new warning must not stop a user
         if version == "editable":
@@ -43,7 +43,10 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
             build(BUILT, strict=False)
         else:
             self._built = Path(tempfile.mkdtemp())
-            build(self._built, strict=False)
+            if is_current():
+                shutil.copytree(BUILT, self._built, dirs_exist_ok=True)
+            else:
+                build(self._built, strict=False)
             if RELEASE in os.environ:
                 build_platforms(self._built)
             build_data["force_include"][str(self._built)] = f"{PACKAGE}/fmus/built"
