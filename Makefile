@@ -36,11 +36,12 @@ demo: $(VENV)/demo.stamp $(VENV)/fmus.stamp ## run the demonstration campaign; l
 fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the tests that take less than a minute, of every room; says what it left out
 	$(BIN)/python -m pytest -q --fast $(PARALLEL)
 
-test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but the benchmarks
-	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark" $(PARALLEL)
+test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but benchmarks and long series
+	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark and not long" $(PARALLEL)
 	$(BIN)/python -m pytest --doctest-modules --pyargs vibroimpact
 
-soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
+soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run long series, then thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
+	$(BIN)/python -m pytest --ignore=tests/benchmarks -m long $(PARALLEL)
 	PYTHONPATH=tests $(BIN)/python -m soak
 
 sanitize: $(VENV)/test.stamp ## run the C tests under the address and undefined-behaviour sanitizers

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +24,7 @@ SEED = 4
 
 COUNTS = pytest.StashKey[dict[str, list[int]]]()
 SLOW = pytest.StashKey[int]()
-"""Number of tests marked slow that `--fast` leaves out."""
+"""Number of tests marked slow or long that `--fast` leaves out."""
 
 TESTS = Path(__file__).parent
 FAST_FOLDERS = ("architecture", "unit")
@@ -38,7 +39,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are not marked slow"
+    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are marked neither slow nor long"
     parser.addoption("--fast", action="store_true", help=text)
     where = "a board for the tests of rigs: Dev1 of this machine, or grpc://HOST:PORT/Dev1"
     parser.addoption("--real-rig", metavar="BOARD", help=where)
@@ -53,7 +54,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("fast"):
         return
-    slow = [item for item in items if item.get_closest_marker("slow")]
+    slow = [item for item in items if item.get_closest_marker("slow") or item.get_closest_marker("long")]
     config.stash[SLOW] = len(slow)
     config.hook.pytest_deselected(items=slow)
     items[:] = [item for item in items if item not in slow]
@@ -97,6 +98,9 @@ def pytest_configure(config: pytest.Config) -> None:
     hypothesis.settings.register_profile("without a clock", deadline=None, suppress_health_check=too_slow)
     hypothesis.settings.load_profile("without a clock")
     _draw_the_same_whatever_is_loaded()
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        # as a shell has it for what runs in the background: tests send Ctrl-C, to the processes that they start too
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     config.stash.setdefault(COUNTS, {})
 
 
