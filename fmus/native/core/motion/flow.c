@@ -228,6 +228,16 @@ static void split_at(const vi_segment *s, double u, vi_motion *m)
 
 /* ---- the series form ---- */
 
+/* 1 / ((n + 1) (n + 2)), by which the equation gives a Taylor coefficient from those before it: no division waits. */
+static const double SHARE[VI_SERIES_ORDER - 1] = {
+    1.0 / 2.0,   1.0 / 6.0,   1.0 / 12.0,  1.0 / 20.0,  1.0 / 30.0,  1.0 / 42.0,  1.0 / 56.0,
+    1.0 / 72.0,  1.0 / 90.0,  1.0 / 110.0, 1.0 / 132.0, 1.0 / 156.0, 1.0 / 182.0, 1.0 / 210.0,
+    1.0 / 240.0, 1.0 / 272.0, 1.0 / 306.0, 1.0 / 342.0, 1.0 / 380.0};
+/* n (n - 1) (n - 2) (n - 3), by which the fourth derivative has a Taylor coefficient. */
+static const double FOURTH[VI_SERIES_ORDER + 1] = {
+    0.0,    0.0,     0.0,     0.0,     24.0,    120.0,   360.0,   840.0,   1680.0,  3024.0,  5040.0,
+    7920.0, 11880.0, 17160.0, 24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
+
 /* Taylor coefficients from the differential equation itself. */
 static void start_series(vi_segment *s, double x, double v)
 {
@@ -239,7 +249,7 @@ static void start_series(vi_segment *s, double x, double v)
     c[0] = 0.0;
     c[1] = v;
     for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
-        const double k = (double)n, share = 1.0 / ((k + 1.0) * (k + 2.0)); /* no division waits for the term before */
+        const double k = (double)n, share = SHARE[n];
         const double held = n == 0 ? s->held - mode->stiffness * x : n == 1 ? s->held_rate : 0.0;
         const double load = drive[0] + held - 2.0 * mode->decay * (k + 1.0) * c[n + 1] - mode->stiffness * c[n];
         c[n + 2] = load * share;
@@ -253,12 +263,11 @@ static void bound_series(vi_segment *s)
 {
     const double *c = s->coefficient;
     double snap = 0.0, scale = 0.0;
+    for (int n = VI_SERIES_ORDER; n >= 4; --n) {
+        snap = snap * s->length + FOURTH[n] * fabs(c[n]);
+    }
     for (int n = VI_SERIES_ORDER; n >= 0; --n) {
-        const double k = (double)n;
         scale = scale * s->length + fabs(c[n]);
-        if (n >= 4) {
-            snap = snap * s->length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
-        }
     }
     s->series_snap_bound = snap;
     s->scale = scale;

@@ -12,6 +12,8 @@ static const double SHORTEST_STEP = 0.05;
 static const double ROUNDING = 1e-12;
 /* Of a single mode steps beyond .8 radians clear little. */
 enum { LONGEST_OF_ONE = 4 };
+/* Levels by which the steps may grow from one block to the next. */
+enum { STEEPEST_RISE = 3 };
 /* Blocks of samples after which a scan ends where it is. */
 enum { MOST_BLOCKS = 4096 };
 enum { MOST_ITERATIONS = 8 };
@@ -68,6 +70,11 @@ typedef struct {
     double reach, rate, fourth; /* of the displacement, its first and its fourth derivative */
 } extent;
 
+/* The same of all modes, at a contact. */
+typedef struct {
+    double reach[VI_MODES], rate[VI_MODES], fourth[VI_MODES];
+} extents;
+
 /* An instant that samples are counted from. */
 typedef struct {
     double u, cosine, sine; /* s after the start; of the forcing phase */
@@ -82,7 +89,7 @@ typedef struct {
     place at;
     bool begins; /* it is at the instant that the scan began with */
     vi_approach now[VI_PORTS]; /* of the contacts, there */
-    extent extent[VI_MODES];
+    extents extent[VI_PORTS];  /* of the contacts */
 } scanner;
 
 /* An underdamped mode swings within its amplitude; the energy of no mode grows. So bounds at the start of a flight hold
@@ -100,6 +107,17 @@ static extent extent_of(const vi_segment *segment)
     const double third = damping * second + mode->stiffness * rate;
     const double reach = mode->natural > 0.0 ? rate / mode->natural : HUGE_VAL;
     return (extent){reach, rate, damping * third + mode->stiffness * second};
+}
+
+static void take_extents(scanner *s, int k)
+{
+    for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
+        const double shape = fabs(s->points[k].shape[j]);
+        const extent e = shape > 0.0 ? extent_of(&s->flight->segment[j]) : (extent){0.0, 0.0, 0.0};
+        s->extent[k].reach[j] = shape * e.reach;
+        s->extent[k].rate[j] = shape * e.rate;
+        s->extent[k].fourth[j] = shape * e.fourth;
+    }
 }
 
 /* ---- how much samples leave open ---- */
@@ -134,14 +152,13 @@ static opening opening_of(const scanner *s, int k, double step)
     } else {
         o.off_cubic = point->steady * (w * w * w * w * share);
     }
+    const extents *e = &s->extent[k];
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
-        const double shape = fabs(point->shape[j]);
-        const extent *e = &s->extent[j];
-        if (ripples(e->fourth, share, e->reach)) {
-            o.ripple += shape * e->reach;
-            speed += shape * e->rate;
+        if (ripples(e->fourth[j], share, e->reach[j])) {
+            o.ripple += e->reach[j];
+            speed += e->rate[j];
         } else {
-            o.off_cubic += shape * (e->fourth * share);
+            o.off_cubic += e->fourth[j] * share;
         }
     }
     o.rate = SHARE_OF_RATE * o.off_cubic + speed * (step / 3.0);
@@ -180,11 +197,11 @@ static bool is_worth(const scanner *s, double step)
     return true;
 }
 
-/* The longest step that is worth a block of samples, no longer than that of `longest`; -1 where none is. */
-static int level_for(const scanner *s, int longest)
+/* The longest step that is worth a block of samples, up to that of `longest` and above that of `shortest`, else that one. */
+static int level_between(const scanner *s, int shortest, int longest)
 {
     int l = longest;
-    while (l >= 0 && !is_worth(s, step_of(s->flight->model, l))) {
+    while (l > shortest && !is_worth(s, step_of(s->flight->model, l))) {
         --l;
     }
     return l;
@@ -220,7 +237,7 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
         third[i] = rise / 3.0 + nw * level->cosine[i] - cw * level->sine[i];
     }
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
-        if (ripples(s->extent[j].fourth, share, s->extent[j].reach)) {
+        if (ripples(s->extent[k].fourth[j], share, s->extent[k].reach[j])) {
             continue;
         }
         const double weight = -point->sign * point->shape[j], x = weight * at->x[j], v = weight * at->v[j];
@@ -395,11 +412,11 @@ static void begin(scanner *s, const vi_flight_instant *from, const vi_approach f
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
         s->at.x[j] = from->part[j].x;
         s->at.v[j] = from->part[j].v;
-        s->extent[j] = extent_of(&s->flight->segment[j]);
     }
     for (int k = 0; k < s->contacts; ++k) {
         if (s->looked_for[k]) {
             s->now[k] = first[k];
+            take_extents(s, k);
         }
     }
 }
@@ -414,7 +431,7 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
     renew(scan, flight->model);
     begin(&s, from, first);
     const int longest = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
-    int l = level_for(&s, longest);
+    int l = level_between(&s, -1, longest);
     for (found->blocks = 0; found->blocks < MOST_BLOCKS && l >= 0; ++found->blocks) {
         vi_scan_level *level = &scan->level[l];
         verdict next;
@@ -433,11 +450,8 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
         if (steps > 0) {
             advance(&s, level, steps);
         }
-        if (steps < VI_SCAN_SAMPLES) {
-            l = level_for(&s, l - 1);
-        } else if (l < longest && is_worth(&s, 2.0 * level->step)) {
-            l += 1;
-        }
+        l = steps < VI_SCAN_SAMPLES ? level_between(&s, -1, l - 1)
+                                    : level_between(&s, l, l + STEEPEST_RISE < longest ? l + STEEPEST_RISE : longest);
     }
     found->low = s.at.u;
     return VI_SCAN_STUCK;

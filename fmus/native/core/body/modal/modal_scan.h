@@ -12,7 +12,7 @@
 
 #include "body/modal/modal_flight.h"
 
-enum { VI_SCAN_SAMPLES = 8, VI_SCAN_LEVELS = 12 };
+enum { VI_SCAN_SAMPLES = 8, VI_SCAN_LEVELS = 16 };
 
 /* Propagators over 1 to VI_SCAN_SAMPLES steps of one length. */
 typedef struct {

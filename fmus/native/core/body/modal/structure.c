@@ -34,12 +34,7 @@ static double segment_length(const vi_structure *s, vi_instant target, vi_ending
 
 static double landing_room(const vi_structure *s)
 {
-    bool external = false;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        const int64_t law = s->contacts[k].law.law;
-        external = external || law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE;
-    }
-    return external ? vi_landing_room(vi_clock_time(&s->model->clock, s->state->now)) : 0.0;
+    return s->model->asks ? vi_landing_room(vi_clock_time(&s->model->clock, s->state->now)) : 0.0;
 }
 
 /* Does a contact of this instant wait for its answer? One that is at the end of the step does in any case. */
@@ -100,18 +95,12 @@ static bool bounces_high(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
     const double time = 1.0 / model->fastest;
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
-        if (s->state->held_rate[j] != 0.0) {
-            return false;
-        }
-    }
     for (int k = 0; k < model->contacts; ++k) {
         if (!vi_structure_watched(s, k)) {
             continue;
         }
         const double clearance = vi_max(0.0, vi_structure_clearance(s, k)), v = vi_structure_approach(s, k);
-        const double most = model->fastest * vi_structure_velocity_size(s, k); /* acceleration */
-        const double flight = vi_parabola_root(clearance, v, most);
+        const double flight = vi_parabola_root(clearance, v, vi_structure_most_acceleration(s, k));
         const bool lingers = s->state->status[k] == VI_CONTACT_TOUCHING
                              && fabs(v) * time < VI_LINGERING * vi_structure_displacement_size(s, k);
         if (lingers || !(flight * model->fastest > 2.0 * VI_LOW_BOUNCE)) {
@@ -309,7 +298,10 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     fresh.phase = vi_phase_of(0.0);
     vi_budget_start(&fresh.budget, now);
     *state = fresh;
+    s->model->asks = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
+        const int64_t law = s->contacts[k].law.law;
+        s->model->asks |= law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE;
         vi_contact_clear(&s->contacts[k]);
         s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;
         place(s, k);

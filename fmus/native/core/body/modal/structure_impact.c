@@ -113,24 +113,33 @@ void vi_structure_end_bounce(const vi_structure *s, int k)
     rest_if_summable(s, k, rebound, restitution_of(s, k, rebound), false);
 }
 
+static bool is_tiny(double acceleration, double rebound, double fastest, double height)
+{
+    return acceleration > 0.0 && (!(rebound * rebound > 2.0 * acceleration * height)
+                                  || 2.0 * rebound * fastest <= VI_SHORT_FLIGHT * acceleration);
+}
+
 /* One contact after the impulses: count it, and let it rest where its chatter can be summed. */
 static void after_impact(const vi_structure *s, int k, double approach, double impulse, double restitution)
 {
     vi_structure_state *state = s->state;
-    const double rebound = rebound_of(s, k, approach, impulse, restitution);
-    double acceleration[VI_MODES], force[VI_PORTS];
-    vi_structure_accelerate(s, acceleration, force);
-    const double a = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
-    const bool graze = vi_chatter_is_graze(approach, a, resolution(s, k, a, approach));
+    const double rebound = rebound_of(s, k, approach, impulse, restitution), fastest = s->model->fastest;
+    const double size = vi_structure_displacement_size(s, k), height = VI_LOW_HEIGHT * size;
+    const double most = vi_structure_most_acceleration(s, k);
+    bool graze = false, tiny = false;
+    if (!(approach * approach > 2.0 * most * (DBL_EPSILON * size)) || is_tiny(most, rebound, fastest, height)) {
+        double acceleration[VI_MODES], force[VI_PORTS];
+        vi_structure_accelerate(s, acceleration, force);
+        const double a = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
+        graze = vi_chatter_is_graze(approach, a, resolution(s, k, a, approach));
+        tiny = is_tiny(a, rebound, fastest, height);
+    }
     state->budget.events += 1;
     if (graze) {
         s->contacts[k].graze_count += 1;
     } else {
         vi_contact_hit(&s->contacts[k], s->record, &s->model->clock, state->now, k + 1, approach, impulse, restitution);
     }
-    const double height = VI_LOW_HEIGHT * vi_structure_displacement_size(s, k);
-    const bool tiny = a > 0.0 && (rebound * rebound <= 2.0 * a * height
-                                  || 2.0 * rebound * s->model->fastest <= VI_SHORT_FLIGHT * a);
     state->status[k] = VI_CONTACT_TOUCHING;
     state->leaving[k] = rebound == 0.0 ? 1 : 0;
     const bool counted =

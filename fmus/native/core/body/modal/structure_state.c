@@ -181,6 +181,21 @@ double vi_structure_velocity_size(const vi_structure *s, int k)
     return sum;
 }
 
+double vi_structure_most_acceleration(const vi_structure *s, int k)
+{
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (s->state->status[l] >= VI_CONTACT_HELD) {
+            return HUGE_VAL;
+        }
+    }
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        if (s->state->held_rate[j] != 0.0) {
+            return HUGE_VAL;
+        }
+    }
+    return s->model->coupled ? HUGE_VAL : s->model->fastest * vi_structure_velocity_size(s, k);
+}
+
 double vi_structure_kinetic(const vi_structure *s)
 {
     return 0.5 * vi_structure_at(s->model, s->state->p, s->state->p);

@@ -38,6 +38,7 @@ typedef struct {
     int32_t varies;            /* modes follow the amplitude: others at each step */
     int32_t coupled;           /* the damping couples the modes: coupling[][] holds all of it */
     double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
+    int64_t asks;              /* derived by vi_structure_start: does another component answer for a contact? 64 bits: no padding */
     /* derived by vi_structure_prepare */
     int32_t at_observed[VI_PORTS];         /* is the contact at the observed point? */
     double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
@@ -223,6 +224,10 @@ double vi_structure_within(const vi_structure *s, double displacement);
  * loads turn into within a radian are among them. */
 double vi_structure_displacement_size(const vi_structure *s, int k);
 double vi_structure_velocity_size(const vi_structure *s, int k);
+
+/* More than the size of the acceleration of contact k, m/s^2, which costs less to know; HUGE_VAL where a stop presses, or an
+ * input slopes. */
+double vi_structure_most_acceleration(const vi_structure *s, int k);
 
 /* Is this contact looked for? */
 static inline bool vi_structure_watched(const vi_structure *s, int k)
