@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.replay_scenes import BOARD, channel, pulse, written
+from support.studies import study_errors
 
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
@@ -38,7 +39,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def study(scene: Scene) -> Study:
-    return study_accuracy(scene, budget=2.0)
+    return study_errors(scene)
 
 
 def test_the_modes_that_the_truth_has_account_for_all_of_the_recording(study: Study) -> None:
