@@ -36,17 +36,17 @@ def values_of(found, method, quantity):
 
 def test_restitution_with_damping_known_is_within_a_half_percent_on_average():
     # 100 samples in a period, noise of 1 % of the peak, 30 draws; one record is eight periods
-    values = values_of(estimates_of("damping and stop known", 30), "energy_known_damping", "restitution")
+    values = values_of(estimates_of("damping and stop known", 10), "energy_known_damping", "restitution")
     assert abs(np.mean(values) - 0.89) < 0.005
     # and each draw by itself
     assert np.max(np.abs(values - 0.89)) < 0.005
 
 
 def test_joint_estimates_are_within_the_targets_on_average():
-    found = estimates_of("nothing known but the force", 40)[:30]
+    found = estimates_of("nothing known but the force", 12)
     methods = ["energy_joint", "weak_form", "trajectory"]
     for method in methods:
-        assert len(values_of(found, method, "restitution")) >= 28
+        assert len(values_of(found, method, "restitution")) >= 11
         assert abs(np.mean(values_of(found, method, "restitution")) - 0.89) < 0.03, method
         assert abs(np.mean(values_of(found, method, "damping_ratio")) - 0.1) < 0.02, method
     # the better the method, the smaller the scatter
@@ -99,6 +99,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_intervals_hold_the_truth_in_most_of_40_records(case):
     shares = covered(case, 40)

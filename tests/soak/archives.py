@@ -19,7 +19,7 @@ from vibroimpact.fmus.packaging.archive import binary_path, unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
-SAMPLE = 80
+SAMPLE = 40
 SECONDS = 20.0
 LONGEST_MESSAGE = 5000
 BINARY = f"binaries/{binary_folder('3.0')}/Hostile{library_suffix()}"

@@ -34,6 +34,7 @@ LONGEST = 2.0
 #: A run is followed for at most so many radians of its stiffest stop: resting on it takes their time.
 MOST_RADIANS = 1e4
 CASES = 20_000
+SAMPLE = 12
 DURATION = 10.0
 STEPS = 97
 #: Energy that may be missing, of all that was turned over; with power laws, followed to a tolerance of 1e-10 each.

@@ -15,7 +15,7 @@ from support.dataset_examples import up_down
 from vibroimpact.analysis import write_dataset
 from vibroimpact.orchestrator.commands.cli import app, load_commands
 
-SAMPLE = 30
+SAMPLE = 12
 SECONDS = 30.0
 
 SCENE = """

@@ -34,7 +34,7 @@ from vibroimpact.analysis.recording import (
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.hardware.recordings import import_recording
 
-SAMPLE = 30
+SAMPLE = 10
 SECONDS = 40.0
 LONGEST_MESSAGE = 5000
 

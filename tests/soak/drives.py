@@ -11,7 +11,7 @@ from support.rig_bench import opened_bench
 
 CASES = 40
 """20 of Ctrl-C and 20 of SIGKILL."""
-SAMPLE = 2
+SAMPLE = 1
 SECONDS = 120.0
 SPEED = 0.5
 """Of the rig, so that cases beside it starve no output."""

@@ -19,7 +19,7 @@ from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES
 from vibroimpact.orchestrator.scene import Scene
 
-CASES, SAMPLE = 1000, 4
+CASES, SAMPLE = 1000, 2
 SECONDS = 60.0
 SAMPLES = 200
 MOST_IMPACTS = 6

@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.run import Runner
 from vibroimpact.orchestrator.scene import parse_scene
 
 CASES = 5000
-SAMPLE = 3
+SAMPLE = 2
 SECONDS = 30.0
 
 #: Faults and places by their numbers in the model descriptions of Faulty; the event fault is one of FMI 3.0 alone.

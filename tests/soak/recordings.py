@@ -21,7 +21,7 @@ from vibroimpact.analysis.recording import Recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.recordings import import_recording
 
-SAMPLE = 100
+SAMPLE = 50
 SECONDS = 10.0
 ROWS = 80
 TIME = np.arange(ROWS) / 100.0

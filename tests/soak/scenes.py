@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.run.result_size import bytes_of_a_run
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
-SAMPLE = 150
+SAMPLE = 80
 SECONDS = 10.0
 LONGEST_MESSAGE = 100_000
 DEADLINE = 1.0

@@ -17,7 +17,7 @@ from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import export_system, load_system
 
-CASES, SAMPLE = 3000, 12
+CASES, SAMPLE = 3000, 6
 SECONDS = 30.0
 LONGEST_MESSAGE = 12_000
 """A scene that is made of a damaged system may have fifty problems."""
