@@ -55,10 +55,9 @@ def test_every_restitution_stays_on_its_side_and_comes_to_its_end(
         assert o.contact("count")[0] > 5
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("position", [0.0, 0.3])
+@pytest.mark.parametrize(("position", "version"), [(0.0, "2.0"), (0.3, "3.0")])
 def test_an_elastic_stop_on_a_damped_and_pressed_mass_does_not_bounce_for_ever(
-    version: str, position: float
+    position: float, version: str
 ) -> None:
     # velocity falls like exp(-2 zeta t / 3), with ever more impacts: there is no accumulation to sum to
     parameters = {"damping": 0.2, "force": 1.0 + position, "displacement_start": -1.0, **stop(position, 1.0)}

@@ -70,8 +70,8 @@ def plane(x: Floats, y: Floats) -> Basins:
 
 @pytest.mark.parametrize("is_slow", [False, True])
 def test_each_start_gets_the_attractor_that_it_ends_on(is_slow: bool) -> None:
-    found = plane(np.linspace(-2.0, 2.0, 21), np.linspace(-1.0, 1.0, 6))
-    find_basins(found, KnownMap(is_slow=is_slow), block=50)
+    found = plane(np.linspace(-2.0, 2.0, 11), np.linspace(-1.0, 1.0, 3))
+    find_basins(found, KnownMap(is_slow=is_slow), block=12)
     names = np.array(found.names)[found.labels]
     assert set(found.names) == {"P(1,2)", "no impacts"}
     assert (names == np.where(found.starts[:, 0] < BORDER, "no impacts", "P(1,2)")).all()

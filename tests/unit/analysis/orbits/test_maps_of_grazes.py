@@ -57,7 +57,7 @@ def test_the_sets_of_the_equation_sheet() -> None:
     stop=st.floats(-0.5, 1.0),
     direction=st.sampled_from([1.0, -1.0]),
 )
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_impacts_of_s_graze_next_and_grazes_lead_to_w(
     damping: float, amplitude: float, w: float, stop: float, direction: float
 ) -> None:
@@ -178,7 +178,7 @@ def test_the_three_classes_of_the_square_root_map(slope: float, chaos: bool) -> 
 
 
 @given(st.floats(0.05, 0.24), st.floats(1e-6, 1e-2))
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_small_slopes_are_periodic_and_scale_by_their_square(slope: float, offset: float) -> None:
     # one visit below d in each round: x scales with d, and a round is longer by one where d is slope^2 as large
     pair = square_root_diagram(slope, np.array([offset, offset * slope**2]), 200, 20_000)

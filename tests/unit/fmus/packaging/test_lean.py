@@ -29,6 +29,7 @@ from vibroimpact.fmus.packaging.fmpy_door import read_description, schema_folder
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 
 BODIES = ("Oscillator", "Chain", "Beam")
+DESCRIBED = read_components()
 SIGNALS = ("Replay", "Gain")
 """Components without a mass, a stop or a bound."""
 POINTS = {
@@ -306,7 +307,7 @@ def test_a_stop_that_a_tool_switches_on_is_hit(tmp_path: Path, name: str) -> Non
 @given(st.sampled_from(BODIES), st.data())
 @settings(max_examples=60)
 def test_any_start_values_have_an_experiment_that_ends(name: str, data: st.DataObject) -> None:
-    component = next(c for c in read_components() if c.name == name)
+    component = next(c for c in DESCRIBED if c.name == name)
     starts = {v.name: v.start for v in component.variables if v.start is not None}
     sizes = st.sampled_from((0.0, 5e-324, 1e-300, 1e-5, 1.0, 1e5, 1e300, 1.7e308))
     chosen = [v for v in starts if isinstance(starts[v], float) and not v.startswith(("contact", "sensor"))]

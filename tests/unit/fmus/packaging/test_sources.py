@@ -56,7 +56,9 @@ def test_every_file_that_is_named_is_there_and_nothing_is_included_that_is_not(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "fmi"), [("Beam", "3.0"), ("Oscillator", "2.0")])
+@pytest.mark.parametrize(
+    ("name", "fmi"), [("Oscillator", "2.0"), pytest.param("Beam", "3.0", marks=pytest.mark.long)]
+)
 def test_fmpy_compiles_the_sources_to_the_same_results(tmp_path: Path, name: str, fmi: str) -> None:
     if shutil.which("cmake") is None:
         pytest.skip("FMPy compiles by cmake, and there is none")
