@@ -39,7 +39,9 @@ def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with tarfile.open(sdist) as archive:
         archive.extractall(folder, filter="data")
     (source,) = (path for path in folder.iterdir() if path.is_dir())
-    shutil.copytree(BUILT, source / "fmus" / "built")  # current: an installation of this checkout has compiled it
+    shutil.copytree(
+        BUILT, source / "fmus" / "built"
+    )  # current: an installation of this checkout has compiled it
     run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder), cwd=source)
     (path,) = folder.glob("*.whl")
     return path

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from support.component_fmu import LOWER, UPPER, VERSIONS, OscillatorFmu, forced, stop

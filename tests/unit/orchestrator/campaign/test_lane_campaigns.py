@@ -122,6 +122,8 @@ def test_a_half_done_campaign_of_another_engine_is_refused_by_one_clear_error(
     assert manifest is not None
     write_manifest(path, scene_of(MAP), replace(manifest.identity, engine=1), manifest.runs)
     parts = sorted((tmp_path / "parts").iterdir())
-    with pytest.raises(UsageError, match=rf"engine was 1, is {ENGINE}\. Results of two kinds are never mixed"):
+    with pytest.raises(
+        UsageError, match=rf"engine was 1, is {ENGINE}\. Results of two kinds are never mixed"
+    ):
         campaign_here(monkeypatch, MAP, tmp_path, runner=DEFAULT_RUNNER)
     assert sorted((tmp_path / "parts").iterdir()) == parts
