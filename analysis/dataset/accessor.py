@@ -166,9 +166,8 @@ def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray
         if name not in ("run", "period", "connection", "compared") and set(coordinate.dims) <= set(
             run_id.dims
         ):
-            values = np.broadcast_to(
-                xr.broadcast(coordinate, run_id)[0].transpose(*run_id.dims).values, run_id.shape
-            )
+            # of the variable: xarray copies all coordinates along with each of them
+            values = coordinate.variable.set_dims(run_id.sizes).transpose(*run_id.dims).values
             columns[str(name)] = values.reshape(-1)  # no copy of what is the same for all runs
     if "direction" in columns and columns["direction"].dtype.kind == "i":
         columns["direction"] = np.array([member.name for member in Direction])[columns["direction"]]
