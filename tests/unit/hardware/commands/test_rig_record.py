@@ -61,7 +61,9 @@ def test_ctrl_c_leaves_a_whole_recording_and_no_journal(address: str, tmp_path: 
     assert [path.name for path in tmp_path.iterdir()] == ["tip.nc"]
 
 
-@pytest.mark.parametrize("amount", [100_000, 700_000, 1_500_000])
+@pytest.mark.parametrize(
+    "amount", [100_000, *(pytest.param(n, marks=pytest.mark.long) for n in (700_000, 1_500_000))]
+)
 def test_a_recording_that_is_killed_is_recovered_with_all_that_reached_its_journal(
     address: str, tmp_path: Path, amount: int
 ) -> None:
