@@ -146,15 +146,15 @@ def test_without_a_force_energy_only_falls_and_by_the_impacts_alone(
             energy = now
 
 
-@pytest.mark.parametrize("impacts", [100_000, pytest.param(1_000_000, marks=pytest.mark.long)])
-@pytest.mark.parametrize("position", [-0.4, 0.0, 0.6])
-def test_an_elastic_stop_conserves_energy_over_very_many_impacts(position: float, impacts: int) -> None:
-    with OscillatorFmu({"displacement_start": -1.0, **stop(position, 1.0)}) as o:
-        o.step(7.0 * impacts)
-        energy = o.get("energy.kinetic") + o.get("energy.potential")
-        assert o.contact("count")[0] > impacts
-        # rounding adds up like a random walk, or at worst in one direction
-        assert abs(energy / 0.5 - 1.0) <= impacts * EPSILON
+@pytest.mark.parametrize("impacts", [pytest.param(1_000_000, marks=pytest.mark.long), 30_000])
+def test_an_elastic_stop_conserves_energy_over_its_impacts(impacts: int) -> None:
+    for position in (-0.4, 0.0, 0.6):
+        with OscillatorFmu({"displacement_start": -1.0, **stop(position, 1.0)}) as o:
+            o.step(7.0 * impacts)
+            energy = o.get("energy.kinetic") + o.get("energy.potential")
+            assert o.contact("count")[0] > impacts
+            # rounding adds up like a random walk, or at worst in one direction
+            assert abs(energy / 0.5 - 1.0) <= impacts * EPSILON
 
 
 @FEW

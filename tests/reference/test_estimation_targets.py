@@ -10,43 +10,42 @@ from vibroimpact.analysis.estimation import Known, estimate_impacts
 
 NOISE = 0.01
 NOMINAL = 0.95
+FEW = 8  # records, where `make soak` has 30 or 40
 
 
 @cache
-def estimates_of(case, count):
-    """Return the estimates from records of a case that differ in their noise."""
+def estimate_of(case, seed):
+    """Return the estimate from one of the records of a case, which differ in their noise."""
     parameters, known, methods, forcing = CASES[case]
     record = record_of(parameters, periods=8)
-    return [
-        estimate_impacts(
-            record.channel(NOISE, seed),
-            record.forcing(**forcing),
-            known,
-            methods=methods,
-            seed=seed,
-            draws=30,
-        )
-        for seed in range(count)
-    ]
+    return estimate_impacts(
+        record.channel(NOISE, seed), record.forcing(**forcing), known, methods=methods, seed=seed, draws=30
+    )
+
+
+def estimates_of(case, count):
+    return [estimate_of(case, seed) for seed in range(count)]
 
 
 def values_of(found, method, quantity):
     return np.array([one.values[method][quantity].value for one in found if method in one.values])
 
 
-def test_restitution_with_damping_known_is_within_a_half_percent_on_average():
+@pytest.mark.parametrize("count", [pytest.param(30, marks=pytest.mark.long), FEW])
+def test_restitution_with_damping_known_is_within_a_half_percent_on_average(count):
     # 100 samples in a period, noise of 1 % of the peak, 30 draws; one record is eight periods
-    values = values_of(estimates_of("damping and stop known", 10), "energy_known_damping", "restitution")
+    values = values_of(estimates_of("damping and stop known", count), "energy_known_damping", "restitution")
     assert abs(np.mean(values) - 0.89) < 0.005
     # and each draw by itself
     assert np.max(np.abs(values - 0.89)) < 0.005
 
 
-def test_joint_estimates_are_within_the_targets_on_average():
-    found = estimates_of("nothing known but the force", 12)
+@pytest.mark.parametrize("count", [pytest.param(30, marks=pytest.mark.long), FEW])
+def test_joint_estimates_are_within_the_targets_on_average(count):
+    found = estimates_of("nothing known but the force", count)
     methods = ["energy_joint", "weak_form", "trajectory"]
     for method in methods:
-        assert len(values_of(found, method, "restitution")) >= 11
+        assert len(values_of(found, method, "restitution")) >= 0.93 * count
         assert abs(np.mean(values_of(found, method, "restitution")) - 0.89) < 0.03, method
         assert abs(np.mean(values_of(found, method, "damping_ratio")) - 0.1) < 0.02, method
     # the better the method, the smaller the scatter
@@ -99,12 +98,12 @@ CASES = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(("count", "least"), [pytest.param(40, 34, marks=pytest.mark.long), (FEW, 6)])
 @pytest.mark.parametrize("case", CASES)
-def test_intervals_hold_the_truth_in_most_of_40_records(case):
-    shares = covered(case, 40)
+def test_intervals_hold_the_truth_in_most_records(case, count, least):
+    shares = covered(case, count)
     assert len(shares) >= 8
-    # 34 or fewer of 40 would be seen once in 150 times; `make coverage` asks 300 records of all kinds
+    # 34 or fewer of 40, or 5 or fewer of 8, would be seen once in 150 times; `make coverage` asks 300 of all kinds
     for key, share in shares.items():
-        assert share >= 34 / 40, (key, share)
-    assert abs(np.mean(list(shares.values())) - NOMINAL) < 0.04
+        assert share >= least / count, (key, share)
+    assert abs(np.mean(list(shares.values())) - NOMINAL) < 0.04 * np.sqrt(40 / count)

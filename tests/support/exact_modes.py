@@ -63,6 +63,23 @@ def chain_modes(masses: Sequence[float], stiffnesses: Sequence[float]) -> tuple[
         return [mp.sqrt(abs(x)) for x in squares], vectors
 
 
+def frequencies_below(
+    masses: Sequence[float], stiffnesses: Sequence[float], frequency: float, factor: float
+) -> int:
+    """Return how many natural frequencies of a chain are below a frequency times a factor.
+
+    These are the negative pivots of K - w^2 M (Sylvester), in 80 digits.
+    """
+    with mp.workdps(80):
+        square = (mp.mpf(frequency) * mp.mpf(factor)) ** 2
+        k = [mp.mpf(float(x)) for x in stiffnesses]
+        count, pivot = 0, mp.inf
+        for i, mass in enumerate(masses):
+            pivot = k[i] + k[i + 1] - square * mp.mpf(float(mass)) - k[i] ** 2 / pivot
+            count += pivot < 0
+        return count
+
+
 def as_doubles(matrix: mp.matrix) -> np.ndarray:
     """Return a matrix rounded to doubles."""
     return np.array([[float(matrix[i, j]) for j in range(matrix.cols)] for i in range(matrix.rows)])

@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 from support.fmu_factory import mass
 from support.places import EXAMPLES
-from support.studies import costs_left_out, study_errors
 
 import vibroimpact as vi
+import vibroimpact.orchestrator.study.accuracy as accuracy
 from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.commands.accuracy import table_of
@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accu
 from vibroimpact.orchestrator.study.accuracy import studied_scene
 from vibroimpact.orchestrator.study.choice import cheapest
 from vibroimpact.orchestrator.study.errors import errors_of
-from vibroimpact.orchestrator.study.memory import IS_MEASURED
+from vibroimpact.orchestrator.study.memory import IS_MEASURED, memory_of_ways
 from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.references import reference_of
 from vibroimpact.orchestrator.study.revision import RevisedTrial
@@ -50,6 +50,15 @@ FREE: dict[str, Any] = {
 }
 
 
+def studied_once(scene: Scene, **options: Any) -> Study:
+    """Study a scene without what the tests of `rigid` are about: repeated runs, counted calls, memory."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(accuracy, "LEAST_ROUNDS", 1)
+        patch.setattr(accuracy, "COUNTED", 0.0)
+        patch.setattr(accuracy, "memory_of_ways", lambda *_: {})
+        return study_accuracy(scene, budget=1e-3, **options)
+
+
 @pytest.fixture(scope="module")
 def rigid() -> Study:
     return study_accuracy(Scene.from_dict(P11), tolerance=1e-6, budget=1.0)
@@ -57,7 +66,7 @@ def rigid() -> Study:
 
 @pytest.fixture(scope="module")
 def yielding() -> Study:
-    return study_errors(Scene.from_dict(HERTZ), tolerance=1e-7)
+    return studied_once(Scene.from_dict(HERTZ), tolerance=1e-7)
 
 
 def ladder(study: Study, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -261,7 +270,7 @@ def test_an_impact_whose_contact_is_not_over_is_none_of_a_way_either() -> None:
 
 def test_samples_tell_impacts_as_late_as_they_are_apart() -> None:
     tables = P11 | {"record": P11["record"] | {"time_series": {"rate": 20.0}}}
-    study = study_errors(Scene.from_dict(tables))
+    study = studied_once(Scene.from_dict(tables))
     its = [one for one in study.measured if one.way.name == "read off samples"]
     assert [one.way.setting for one in its] == [5.0, 20.0, 80.0, 320.0]
     assert all(one.way.model for one in its)
@@ -279,7 +288,7 @@ def test_a_chain_is_studied_with_fewer_modes_and_with_stops_of_other_laws() -> N
         ],
         "record": {"recorded_periods": 1},
     }
-    study = study_errors(Scene.from_dict(tables))
+    study = studied_once(Scene.from_dict(tables))
     fused = [one for one in study.measured if one.way.name == "fused"]
     balances = [one.errors.of["energy_balance"] for one in fused]
     assert balances[0] > 1e-9  # at a contact tolerance of .01
@@ -297,7 +306,7 @@ def test_the_energy_that_held_forces_add_is_an_error_too() -> None:
         "stop": [{"law": "kelvin_voigt", "position": 1.0, "stiffness": 1e3, "damping": 3.0}],
         "record": {"transient_periods": 2, "recorded_periods": 1},
     }
-    study = study_errors(Scene.from_dict(tables))
+    study = studied_once(Scene.from_dict(tables))
     energies = {
         one.way.name: one.errors.of["interface_energy"] for one in study.measured if not one.errors.failure
     }
@@ -311,6 +320,8 @@ def test_what_it_costs_is_counted_too(rigid: Study) -> None:
     assert {one.calls for one in rigid.measured if "CVode" in one.way.name} == {-1}  # FMPy calls it
     assert all(len(one.seconds) >= 3 for one in (fused, coupled))
     assert 0.0 < fused.cost < coupled.cost
+    its = [one for one in rigid.measured if not one.errors.failure]
+    assert all(one.memory > 0 for one in its) or not IS_MEASURED
 
 
 @pytest.mark.parametrize(("width", "has_all"), [(80, False), (140, True)])
@@ -339,7 +350,7 @@ def test_a_chaotic_motion_is_found_out_and_compared_by_its_first_impacts_and_its
         EXAMPLES / "thesis" / "figure_2_11.toml",
         ["record.transient_periods=50", "record.recorded_periods=250"],
     )
-    study = study_errors(scene)
+    study = studied_once(scene)
     assert study.reference.chaotic
     assert study.orbit == "chaotic"
     coupled = study.measured[1]
@@ -392,7 +403,7 @@ def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
     scene = load_scene(
         EXAMPLES / "two_oscillators.toml", ["record.recorded_time=2", "execution.macro_step=0.05"]
     )
-    study = study_errors(scene)
+    study = studied_once(scene)
     assert "iterated exchange" in study.reference.name
     for exchange, order in (("jacobi", 1.0), ("gauss_seidel", 1.0), ("iterated", 2.0)):
         steps, errors = ladder(study, f"coupled, {exchange}")
@@ -413,13 +424,13 @@ def test_a_component_of_another_tool_that_restores_no_state_is_named(tmp_path: P
         "record": {"recorded_time": 2.0, "variables": ["ours.displacement", "theirs.x"], "rate": 20.0},
         "execution": {"macro_step": 0.1, "guard": False},
     }
-    study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    study = studied_once(Scene.from_dict(tables))
     assert study.remarks[0].startswith("iterated exchange with theirs: steps cannot be repeated")
     steps, errors = ladder(study, "coupled, gauss_seidel")
     assert observed_order(steps, errors) == pytest.approx(1.0, abs=0.2)
     np.testing.assert_array_equal(errors, ladder(study, "coupled, iterated")[1])
     assert study.chosen is not None
-    assert all(one.memory > 0 for one in study.measured) or not IS_MEASURED
+    assert memory_of_ways(study.scene, {}, [0]).get(0, 0) > 0 or not IS_MEASURED
 
 
 CHAOTIC_COMPONENTS: dict[str, Any] = {
@@ -447,7 +458,7 @@ CHAOTIC_COMPONENTS: dict[str, Any] = {
 
 
 def test_chaos_of_a_general_scene_is_compared_from_its_start_and_then_by_what_it_samples() -> None:
-    study = study_errors(Scene.from_dict(CHAOTIC_COMPONENTS))
+    study = studied_once(Scene.from_dict(CHAOTIC_COMPONENTS))
     assert study.reference.chaotic
     assert study.scene.record.recorded_time < 100.0
     assert all(one.error("all") < 1e-10 for one in study.measured)
@@ -462,14 +473,14 @@ def test_a_free_motion_without_stops_is_compared_by_its_end() -> None:
         "body": {"mass": 1.0, "stiffness": 4.0, "displacement_start": 1.0},
         "record": {"recorded_time": 7.0},
     }
-    tolerances, errors = ladder(study_errors(Scene.from_dict(free)), "model exchange, CVode")
+    tolerances, errors = ladder(studied_once(Scene.from_dict(free)), "model exchange, CVode")
     assert len(tolerances) >= 3
     assert np.all(np.diff(errors) < 0.0)
 
 
 def test_what_cannot_be_compared_is_said(rigid: Study) -> None:
     still = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 1.0}}
-    assert advice(study_errors(Scene.from_dict(still))).startswith("Nothing that is recorded moves")
+    assert advice(studied_once(Scene.from_dict(still))).startswith("Nothing that is recorded moves")
     vague = replace(rigid.reference, error=dict.fromkeys(rigid.reference.error, 1.0))
     assert cheapest(rigid.measured, None, "all", vague) is None
     assert "the reference is known to 1e+00 only" in advice(replace(rigid, reference=vague, chosen=None))
@@ -489,7 +500,7 @@ def test_misuse_is_told() -> None:
         vi.accuracy(P11, tolerance=-1.0)
     with pytest.raises(UsageError, match="expected a scene with something to vary"):
         vi.accuracy(alone, budget=1.0)
-    with costs_left_out(), pytest.raises(UsageError, match=r"got 1e-20; reached was .*e-1.* by "):
+    with pytest.raises(UsageError, match=r"got 1e-20; reached was .*e-1.* by "):
         vi.accuracy(FREE, tolerance=1e-20, budget=1.0)
 
 
