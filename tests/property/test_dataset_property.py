@@ -19,7 +19,7 @@ def runs_of(lengths: list[tuple[int, int, int]]) -> list[RunRecord]:
     return [record(float(k), *sizes) for k, sizes in enumerate(lengths)]
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(Lengths, st.randoms(use_true_random=False))
 def test_ragged_arrays_come_back_run_by_run_from_a_file(
     lengths: list[tuple[int, int, int]], random: object
@@ -44,7 +44,7 @@ def test_ragged_arrays_come_back_run_by_run_from_a_file(
                 np.testing.assert_array_equal(sampled.velocity, run.samples[:, 2])
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(Lengths, st.data())
 def test_parts_in_any_order_merge_into_what_one_build_gives(
     lengths: list[tuple[int, int, int]], data: st.DataObject
@@ -77,7 +77,7 @@ def part_of(runs: list[RunRecord], chosen: list[int]) -> xr.Dataset:
 Sizes = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3)), min_size=1, max_size=8)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(Sizes, st.data())
 def test_events_and_residuals_of_parts_in_any_order_come_back_run_by_run(
     sizes: list[tuple[int, int]], data: st.DataObject

@@ -132,7 +132,7 @@ def test_the_determinant_is_what_restitution_and_damping_leave(
         assert abs(orbit.determinant - orbit.exact_determinant) <= 1e-12 * size
 
 
-@FEW
+@settings(FEW, max_examples=20)
 @given(chains(), shares, restitutions, st.integers(1, 2))
 def test_multipliers_are_those_of_differences_of_another_flow(
     chain: Chain, share: float, r: float, q: int

@@ -13,7 +13,7 @@ from vibroimpact.analysis.dataset import check, read_flat
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
-FEW = settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=25, derandomize=True, suppress_health_check=list(HealthCheck))
 LAWS = (
     "restitution = {r}",
     'law = "kelvin_voigt"\nstiffness = {k}\ndamping = {c}',

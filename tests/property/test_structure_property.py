@@ -23,7 +23,7 @@ from support.random_structures import (
 from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 from support.tolerance import ROUNDING
 
-FEW = settings(max_examples=100, derandomize=True, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=40, derandomize=True, suppress_health_check=list(HealthCheck))
 
 #: No body may be further beyond a rigid stop, relative to the displacements that add up to its position.
 PENETRATION = 1e-12

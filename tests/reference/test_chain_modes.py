@@ -5,9 +5,8 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from support.exact_modes import as_doubles
+from support.exact_modes import as_doubles, frequencies_below
 from support.exact_modes import chain_modes as exact_modes
-from support.exact_modes import frequencies_below
 from support.modes import ChainModes, chain_modes
 from support.tolerance import EPSILON, ROUNDING
 

@@ -30,22 +30,29 @@ class KnownMap:
         self._rate = 0.99 if is_slow else 0.5
         self.followed = 0
 
-    def _once(self, states: Floats) -> Floats:
+    def _after(self, states: Floats, periods: int) -> Floats:
         x, y = states.T
-        left = np.column_stack([-1.0 + self._rate * (x + 1.0), self._rate * y])
+        rate = self._rate**periods
+        left = np.column_stack([-1.0 + rate * (x + 1.0), rate * y])
         # a cycle of two about (1, 0): y turns round
-        right = np.column_stack(
-            [1.0 + self._rate * (x - 1.0), -np.sign(y + 1e-300) * (0.5 + self._rate * (abs(y) - 0.5))]
-        )
-        logistic = (x - 4.0) % 1.0
-        wild = np.column_stack([4.0 + np.clip(3.999 * logistic * (1.0 - logistic), 1e-9, 1.0 - 1e-9), y])
+        turned = (-1.0) ** periods * np.sign(y + 1e-300)
+        right = np.column_stack([1.0 + rate * (x - 1.0), turned * (0.5 + rate * (abs(y) - 0.5))])
         where = np.where(x < BORDER, 0, np.where(x < 3.0, 1, 2))
-        return np.choose(where[:, None], [left, right, wild])
+        found = np.where(where[:, None] == 0, left, right)
+        if (where == 2).any():
+            found[where == 2] = self._wild(states[where == 2], periods)
+        return found
+
+    @staticmethod
+    def _wild(states: Floats, periods: int) -> Floats:
+        logistic = (states[:, 0] - 4.0) % 1.0
+        for _ in range(periods):
+            logistic = np.clip(3.999 * logistic * (1.0 - logistic), 1e-9, 1.0 - 1e-9)
+        return np.column_stack([4.0 + logistic, states[:, 1]])
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
         self.followed += len(states) * periods if len(states) > 1 else 0
-        for _ in range(periods):
-            states = self._once(states)
+        states = self._after(states, periods)
         return Ends(states, np.isfinite(states).all(axis=1))
 
     def classes(

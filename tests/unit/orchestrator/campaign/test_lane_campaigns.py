@@ -71,12 +71,12 @@ def test_a_campaign_in_lanes_that_is_interrupted_has_the_bits_of_one_that_is_not
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and sessions")
-@pytest.mark.parametrize("path", [pytest.param("independent", marks=pytest.mark.long), "up-down"])
+@pytest.mark.parametrize(("path", "points"), [("independent", 12), ("up-down", 6)])
 def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lanes(
-    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    path: str, points: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     restitution = '"stop[1].restitution" = { start = 0.0, stop = 0.9, points = 40 }\n'
-    text = BODY + restitution + frequency(path, 12)
+    text = BODY + restitution + frequency(path, points)
     whole = campaign_here(monkeypatch, text, tmp_path / "whole", runner=DEFAULT_RUNNER)
     rests = read_flat(whole.dataset).stick_count.values > 0
     assert 0 < np.count_nonzero(rests) < rests.size  # the lanes leave points that rest
