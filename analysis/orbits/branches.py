@@ -165,8 +165,9 @@ def extrema(orbit: PeriodicOrbit) -> Floats:
         x, v = orbit.at(before_impact)
         tops, at = _turns(before_impact, x, v / orbit.body.angular_frequency)
         places = (np.floor(np.append(at, phases) / TURN) % orbit.periods).astype(int)
-        for place, value in zip(places, np.append(tops, x), strict=True):
-            found[place] = np.fmax(found[place, 0], value), np.fmin(found[place, 1], value)
+        values = np.append(tops, x)
+        np.fmax.at(found[:, 0], places, values)
+        np.fmin.at(found[:, 1], places, values)
     return found
 
 

@@ -232,12 +232,12 @@ def _nearer(
 
 def shortened(step: Floats, phases: Floats, periods: int) -> Floats:
     """Return a step of the phases, or a part of it that keeps the impacts in their order and within their train."""
-    gaps = np.append(np.diff(phases), phases[0] + TURN * periods - phases[-1])
+    gaps = np.append(phases[1:], phases[0] + TURN * periods) - phases
     if not gaps.min() > 0.0:
         raise OrbitError(
             f"orbit: expected impacts one after the other, got two at one phase of {np.round(phases, 6).tolist()}."
         )
-    closing = np.append(np.diff(-step), -step[0] + step[-1])
+    closing = step - np.append(step[1:], step[0])
     most = float(np.max(-closing / gaps, initial=0.0))
     part = min(1.0, 0.5 / most if most > 0.0 else 1.0, 0.5 / max(float(np.abs(step).max()), 0.5))
     return part * step

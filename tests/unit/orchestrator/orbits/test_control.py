@@ -78,7 +78,8 @@ def test_other_laws_keep_it_as_well(law: str) -> None:
 def test_noisy_speeds_are_enough_and_cost_larger_corrections() -> None:
     found = kept(noise=1e-3, stay=5)
     assert found.attrs["kept_to"] - GRAZE < THESIS
-    assert kept(noise=1e-3, stay=5).identical(found), "the noise is that of its seed"
+    once, again = (vi.control(scene(), 1.0, 0.95, step=5e-3, noise=1e-3) for _ in range(2))
+    assert once.identical(again), "the noise is that of its seed"
     middle = (found.angular_frequency > 0.8) & (found.angular_frequency < 0.9)
     spread = float(found.correction[middle].std())
     assert 1e-5 < spread < 1e-3
@@ -106,7 +107,7 @@ def test_a_stop_below_and_a_second_one_that_is_never_met_change_nothing(found: x
 
 
 def test_what_came_before_an_interruption_is_kept() -> None:
-    plan = control_plan(scene(), 1.0, 0.9, ControlSettings(step=1e-4))
+    plan = control_plan(scene(), 1.0, 0.97, ControlSettings(step=1e-3))
     into = Controlled(plan)
 
     def stop(_: float, impacts: int) -> None:

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from support.command_line import in_this_process as ran
 from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits import OrbitError
+from vibroimpact.analysis.orbits.search import orbits_of
 
 
 def in_this_process(arguments: list[str]) -> tuple[int, str, str]:
@@ -25,7 +27,7 @@ PARAMETER = "forcing.angular_frequency"
 
 @pytest.fixture(scope="module")
 def branches() -> object:
-    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.03)
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05)
 
 
 def test_branches_are_a_dataset_whose_runs_are_orbits(branches: object) -> None:
@@ -84,33 +86,19 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
     assert code == 0
 
 
-def test_bifurcations_over_two_numbers_are_written_and_drawn(tmp_path: Path) -> None:
-    found = vi.follow(
-        SCENE,
-        PARAMETER,
-        0.6,
-        1.6,
-        step=0.05,
-        doublings=0,
-        second="forcing.amplitude",
-        second_range=(0.3, 0.7),
-    )
-    assert {"angular_frequency", "amplitude"} <= set(found.coords)
-    assert set(np.unique(found["orbit_special"].values)) == {1, 2, 4}
-    vi.draw(found)
+@pytest.fixture(scope="module")
+def loci() -> xr.Dataset:
+    both = {"second": "forcing.amplitude", "second_range": (0.3, 0.7)}
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, **both)
 
 
-def test_curves_lie_on_the_map_of_both_numbers() -> None:
-    loci = vi.follow(
-        SCENE,
-        PARAMETER,
-        0.6,
-        1.6,
-        step=0.05,
-        doublings=0,
-        second="forcing.amplitude",
-        second_range=(0.3, 0.7),
-    )
+def test_bifurcations_over_two_numbers_are_a_dataset_and_drawn(loci: xr.Dataset) -> None:
+    assert {"angular_frequency", "amplitude"} <= set(loci.coords)
+    assert set(np.unique(loci["orbit_special"].values)) == {1, 2, 4}
+    vi.draw(loci)
+
+
+def test_curves_lie_on_the_map_of_both_numbers(loci: xr.Dataset) -> None:
     grid = {
         PARAMETER: {"start": 0.7, "stop": 1.5, "points": 5},
         "forcing.amplitude": {"values": [0.4, 0.5, 0.6]},
@@ -242,6 +230,12 @@ def test_what_was_followed_before_an_error_is_written(
 CHAIN = ROOT / "examples" / "thesis" / "figure_6_13.toml"
 
 
+def few_starts(patch: pytest.MonkeyPatch) -> None:
+    """Look for orbits at 2 values of the parameter instead of 25, from 64 trains of impacts instead of 256."""
+    patch.setattr("vibroimpact.orchestrator.orbits.first_orbits.SEEDS", 2)
+    patch.setitem(orbits_of.__kwdefaults__, "starts", 64)
+
+
 def of_chain(value: float) -> vi.Scene:
     return vi.Scene.from_file(CHAIN).with_values({PARAMETER: value})
 
@@ -267,7 +261,7 @@ def test_a_seed_is_followed_both_ways_to_the_grazes_that_it_shares_with_other_or
 def test_orbits_of_several_impacts_are_begun_along_the_range_and_each_branch_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("vibroimpact.orchestrator.orbits.first_orbits.SEEDS", 4)
+    few_starts(monkeypatch)
     at = ["--set", "sweep={}", "--set", f"{PARAMETER}=0.94", "--impacts", "2", "--periods", "2"]
     span = ["--parameter", PARAMETER, "--from", "0.93", "--to", "0.95", "--step", "0.05"]
     code, out, _ = in_this_process(["follow", str(SCENE), *span, *at])
@@ -281,7 +275,7 @@ def test_orbits_of_several_impacts_are_begun_along_the_range_and_each_branch_onc
 def test_a_branch_that_lies_between_the_values_of_the_range_is_begun_at_the_own_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("vibroimpact.orchestrator.orbits.first_orbits.SEEDS", 4)
+    few_starts(monkeypatch)
     found = vi.follow(of_chain(0.857), PARAMETER, 0.5, 2.2, impacts=2, doublings=0, step=0.05)
     assert dict(special(found))["fold"] == pytest.approx(0.85749282, abs=1e-8)
 
