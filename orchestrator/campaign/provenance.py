@@ -47,6 +47,12 @@ def _seed(scene: Scene) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that results may depend on."""
+    return dict(_versions())
+
+
+@lru_cache(maxsize=1)
+def _versions() -> dict[str, str]:
+    """Read them once in a process: each is a search of all packages that are installed."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

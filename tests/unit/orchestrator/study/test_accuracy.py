@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 from support.fmu_factory import mass
 from support.places import EXAMPLES
+from support.quick_studies import BUDGET, run_once
 
 import vibroimpact as vi
-import vibroimpact.orchestrator.study.accuracy as accuracy
 from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.commands.accuracy import table_of
@@ -53,10 +53,8 @@ FREE: dict[str, Any] = {
 def studied_once(scene: Scene, **options: Any) -> Study:
     """Study a scene without what the tests of `rigid` are about: repeated runs, counted calls, memory."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(accuracy, "LEAST_ROUNDS", 1)
-        patch.setattr(accuracy, "COUNTED", 0.0)
-        patch.setattr(accuracy, "memory_of_ways", lambda *_: {})
-        return study_accuracy(scene, budget=1e-3, **options)
+        run_once(patch)
+        return study_accuracy(scene, budget=BUDGET, **options)
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.quick_studies import BUDGET, run_once
 from support.replay_scenes import BOARD, channel, pulse, written
-from support.studies import study_errors
 
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
@@ -39,7 +39,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def study(scene: Scene) -> Study:
-    return study_errors(scene)
+    with pytest.MonkeyPatch.context() as patch:
+        run_once(patch)
+        return study_accuracy(scene, budget=BUDGET)
 
 
 def test_the_modes_that_the_truth_has_account_for_all_of_the_recording(study: Study) -> None:
