@@ -189,22 +189,35 @@ class Coordinates:
 
     def parameters(self, values: Sequence[float] | Floats) -> Parameters | None:
         """Return the parameters of coordinates; None where the stiffness is not positive."""
-        given: dict[str, Any] = {name: float(value) for name, value in zip(self.names, values, strict=True)}
-        square = given.get("natural_frequency", self.held.natural_frequency**2)
-        if not square > 0.0:
-            return None
-        natural = math.sqrt(square)
+        there, numbers = self.numbers(np.array([values], dtype=np.float64))
+        return self.held.with_values(self.names, numbers[0]) if there[0] else None
+
+    def numbers(self, values: Floats) -> tuple[NDArray[np.bool_], Floats]:
+        """Return where the stiffness of many coordinates is positive, and there the numbers of the names.
+
+        Parameters
+        ----------
+        values : ndarray, shape (row, name)
+
+        Returns
+        -------
+        there : ndarray, shape (row,)
+        numbers : ndarray, shape (row, name)
+            Of no meaning elsewhere.
+        """
+        given = dict(zip(self.names, values.T, strict=True))
+        square = given.get("natural_frequency", np.full(len(values), self.held.natural_frequency**2))
+        there = square > 0.0
+        square = np.where(there, square, 1.0)
+        natural = np.sqrt(square)
         divisors = {"damping_ratio": 2.0 * natural, "static_deflection": square, "offset": square}
-        changes = {name: value / divisors.get(name, 1.0) for name, value in given.items()}
+        found = {name: value / divisors.get(name, 1.0) for name, value in given.items()}
         if "natural_frequency" in given:
-            changes["natural_frequency"] = natural
+            found["natural_frequency"] = natural
         if self.both:
             cosine, sine = given["static_deflection"], given["phase"]
-            changes |= {
-                "static_deflection": math.hypot(cosine, sine) / square,
-                "phase": math.atan2(sine, cosine),
-            }
-        return replace(self.held, **changes)
+            found |= {"static_deflection": np.hypot(cosine, sine) / square, "phase": np.arctan2(sine, cosine)}
+        return there, np.array([found[name] for name in self.names]).reshape(values.T.shape).T
 
     def derivative(self, p: Parameters) -> Floats:
         """Return d coordinates / d parameters, shape (name, name)."""
@@ -232,17 +245,15 @@ class Coordinates:
         slope = self.derivative(p)
         values, vectors = np.linalg.eigh(slope @ covariance @ slope.T)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn = [self.parameters(self.of(p) + root @ one) for one in _normal_draws(len(self.names))]
+        there, drawn = self.numbers(self.of(p) + _normal_draws(len(self.names)) @ root.T)
         tail = 50.0 * (1.0 - confidence)
-        open_ended = sum(one is None for one in drawn) > 0.01 * tail * len(drawn)
+        open_ended = np.count_nonzero(~there) > 0.01 * tail * len(drawn)
         found = {}
-        for name in self.names:
+        for name, cloud in zip(self.names, drawn[there].T, strict=True):
             if open_ended and name not in _WITHOUT_STIFFNESS:
                 continue
-            middle = getattr(p, name)
-            cloud = np.array([getattr(one, name) for one in drawn if one is not None])
             if name == "phase":
-                cloud = middle + np.angle(np.exp(1j * (cloud - middle)))
+                cloud = p.phase + np.angle(np.exp(1j * (cloud - p.phase)))
             low, high = np.percentile(cloud, [tail, 100.0 - tail])
             found[name] = (float(low), float(high))
         return found

@@ -414,13 +414,13 @@ def _one_sided(signal: Signal, index: NDArray[np.intp], instant: float, reach: f
 
 def _crossing(one: Floats, other: Floats, reach: float) -> float:
     """Return the time from the present instant to where two cubics meet, s (Newton)."""
-    difference = one - other
+    a, b, c, d = map(float, one - other)
     s = 0.0
     for _ in range(6):
-        slope = polyval(s, polyder(difference))
+        slope = (3.0 * d * s + 2.0 * c) * s + b
         if slope == 0.0:
             return math.inf
-        s -= float(polyval(s, difference) / slope)
+        s -= (((d * s + c) * s + b) * s + a) / slope
         if not abs(s) < 1.0:
             return math.inf
     return s * reach

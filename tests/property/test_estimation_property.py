@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -67,12 +68,18 @@ def test_noiseless_record_gives_the_truth(parameters, ratio):
     assert weak["restitution"].value == pytest.approx(truth.restitution, abs=2e-3)
 
 
+@cache
+def estimated_once(seed, known=None):
+    record = record_of(THESIS, periods=6)
+    return estimated(record.time, record.channel(0.005, seed).values, record.forcing(), known)
+
+
 @settings(max_examples=5)
-@given(st.floats(1e-6, 1e6), st.integers(0, 5))
+@given(st.floats(1e-6, 1e6), st.integers(0, 2))
 def test_scale_of_the_displacement_leaves_restitution_and_damping_unchanged(scale, seed):
     record = record_of(THESIS, periods=6)
     values = record.channel(0.005, seed).values
-    one = estimated(record.time, values, record.forcing())
+    one = estimated_once(seed)
     other = estimated(record.time, scale * values, record.forcing(static_deflection=scale * 2.3))
     for method in METHODS:
         for quantity in ("restitution", "damping_ratio", "natural_frequency"):
@@ -82,11 +89,11 @@ def test_scale_of_the_displacement_leaves_restitution_and_damping_unchanged(scal
 
 
 @settings(max_examples=5)
-@given(st.floats(-100.0, 100.0), st.integers(0, 5))
+@given(st.floats(-100.0, 100.0), st.integers(0, 2))
 def test_time_shift_leaves_all_but_the_phase_unchanged(shift, seed):
     record = record_of(THESIS, periods=6)
     values = record.channel(0.005, seed).values
-    one = estimated(record.time, values, record.forcing(), Known(stop_position=0.0))
+    one = estimated_once(seed, Known(stop_position=0.0))
     phase = record.truth.phase - 64.32 * shift
     later = Forcing(64.32, 2.3, math.remainder(phase, 2.0 * math.pi))
     other = estimated(record.time + shift, values, later, Known(stop_position=0.0))
