@@ -69,6 +69,7 @@ def _registry() -> pint.UnitRegistry[float]:
     return pint.UnitRegistry()
 
 
+@lru_cache(maxsize=256)
 def measured_unit(label: str) -> MeasuredUnit:
     """Return what a unit label means.
 

@@ -153,6 +153,7 @@ class _Fit:
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
         self.simulations = 0
         self.flat: dict[int, float] = {}
+        self._at: tuple[Sequence[Sequence[Comparison]], Floats, list[Floats]] | None = None
 
     def run(self) -> ReplayFit:
         values, remarks = self.start.copy(), []
@@ -354,7 +355,15 @@ class _Fit:
             )
 
     def _slopes(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
-        """Return the derivative of each residual by each number, shape (sample, key) for each channel."""
+        """Return the derivative of each residual by each number, shape (sample, key) for each channel.
+
+        Those of the last values are kept: at the start they are asked for three times.
+        """
+        if not (self._at and self._at[0] is comparisons and np.array_equal(self._at[1], values)):
+            self._at = comparisons, values.copy(), self._slopes_at(values, comparisons)
+        return self._at[2]
+
+    def _slopes_at(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
         columns = []
         for place in range(len(values)):
             step = 10.0 * DERIVATIVE_STEP * self.scale[place]

@@ -179,13 +179,15 @@ class Session:
         buffer = group.values
         place = None if name is None else self._input_names.index(name)
         slopes = np.zeros(len(times)) if values is None else np.append(np.diff(values) / np.diff(times), 0.0)
-        plain = self._plan.is_plain(self._forcing)
+        given = np.zeros((len(times), 2)) if values is None else np.column_stack([values, slopes])
+        sample = driver.sampled if self._plan.is_plain(self._forcing) else self.sample
+        advance, pass_on = driver.advance, group.set
         for i, time in enumerate(times.tolist()):
-            driver.advance(time)
+            advance(time)
             if place is not None and values is not None:
-                buffer[place], buffer[place + 1] = values[i], slopes[i]
-                group.set()
-            rows[i] = driver.sampled() if plain else self.sample()
+                buffer[place : place + 2] = given[i]
+                pass_on()
+            rows[i] = sample()
         return rows
 
     def hold(self, times: Floats, forces: Floats) -> Floats:
