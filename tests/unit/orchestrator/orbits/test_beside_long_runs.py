@@ -38,7 +38,7 @@ def scene(path: Path, **changes: Any) -> vi.Scene:
 def chain() -> Followed:
     """Return the branches of the chain of the thesis."""
     followed = Followed(scene(CHAIN), FREQUENCY)
-    follow_branches(followed.scene, FREQUENCY, 0.8, 2.1, doublings=2, followed=followed)
+    follow_branches(followed.scene, FREQUENCY, 0.3, 2.2, doublings=2, followed=followed)
     return followed
 
 
