@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import sqlite3
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -84,13 +85,15 @@ def test_a_job_is_taken_up_again_after_a_database_that_failed(
 ) -> None:
     job, _ = store.submit(ASKED)
     until(store, job, State.running)
+    failed = threading.Event()
     with monkeypatch.context() as patched:
 
         def fails(*_: object, **__: object) -> bool:
+            failed.set()
             raise sqlite3.OperationalError("disk I/O error")
 
         patched.setattr(store, "change", fails)
-        time.sleep(0.6)
+        assert failed.wait(20.0)  # as the end of the job is noted, or what it said before
     assert until(store, job, State.done).attempts == 2
 
 
