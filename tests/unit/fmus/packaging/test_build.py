@@ -10,7 +10,16 @@ import pytest
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging import build as building
-from vibroimpact.fmus.packaging.build import BUILT, CORE_LIBRARY, NATIVE, build, fingerprint, is_current, main
+from vibroimpact.fmus.packaging.build import (
+    BUILT,
+    CORE_LIBRARY,
+    NATIVE,
+    build,
+    fingerprint,
+    is_current,
+    main,
+    read_components,
+)
 from vibroimpact.fmus.packaging.compiler import compile_library, find_compiler
 from vibroimpact.fmus.packaging.platform_names import library_suffix
 
@@ -21,11 +30,14 @@ def sources(tmp_path: Path) -> Path:
 
 
 def keep_one_component(sources: Path) -> None:
-    """Leave the Gain alone in a copy of the sources, and no lanes: the others take as long each, lanes longer."""
+    """Leave the Sensor and its part of the core in a copy of the sources: all of it takes twenty times as long."""
     for description in sources.glob("*/variables.toml"):
-        if description.parent.name != "gain":
+        if description.parent.name != "sensor":
             shutil.rmtree(description.parent)
-    shutil.rmtree(sources / "core" / "lanes")
+    (sensor,) = read_components(sources)
+    for path in (sources / "core").rglob("*.c"):
+        if not sensor.uses(path.relative_to(sources / "core").as_posix()):
+            path.unlink()
 
 
 def test_an_edit_of_the_c_makes_the_build_out_of_date(sources: Path) -> None:
@@ -83,8 +95,10 @@ def test_a_machine_without_a_compiler_is_told_what_to_install(monkeypatch: pytes
 def test_the_command_builds_says_what_is_out_of_date_and_exports_what_the_fmu_hides(
     sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (sources / "core" / "zz_probe.c").write_text("int vi_probe(void);\nint vi_probe(void) { return 42; }\n")
     keep_one_component(sources)
+    (sources / "core" / "zz_probe.c").write_text("int vi_probe(void);\nint vi_probe(void) { return 42; }\n")
+    description = sources / "sensor" / "variables.toml"
+    description.write_text(description.read_text().replace("core = [", 'core = ["zz_probe", '))
     monkeypatch.setattr(building, "update_readmes", lambda write=True: ())
     monkeypatch.setattr(building, "build", partial(build, native=sources))
     monkeypatch.setattr(building, "is_current", partial(is_current, native=sources))
@@ -97,7 +111,7 @@ def test_the_command_builds_says_what_is_out_of_date_and_exports_what_the_fmu_hi
     written = [Path(line) for line in out.splitlines()]
     assert all(path.is_file() for path in written)
 
-    library, fmu = built / f"{CORE_LIBRARY}{library_suffix()}", built / "fmi3" / "Gain.fmu"
+    library, fmu = built / f"{CORE_LIBRARY}{library_suffix()}", built / "fmi3" / "Sensor.fmu"
     assert {library, fmu} <= set(written)
     assert ctypes.CDLL(str(library)).vi_probe() == 42
     with zipfile.ZipFile(fmu) as archive:

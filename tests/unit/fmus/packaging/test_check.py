@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fmpy.validation import validate_fmu
 
 from vibroimpact.fmus import component_name, components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
@@ -58,6 +59,20 @@ def test_a_misspelt_capability_is_found_though_the_schema_lets_it_pass(tmp_path:
     problems = check_fmu(path)
     assert [problem.partition(":")[0] for problem in problems] == ["ModelExchange", "CoSimulation"]
     assert all("got canGetAndSetFMUstate. Did you mean canGetAndSetFMUState?" in p for p in problems)
+
+
+@pytest.mark.parametrize(
+    ("name", "is_legal"),
+    [
+        *(("a.b[2,31].c_1", True), ("_x", True), ("der(x)", True), ("'any thing'", True)),
+        *(("any thing", False), ("a[1", False), ("a[]", False), ("1a", False), ("a..b", False), ("ä", False)),
+        ("output", False),  # twice
+    ],
+)
+def test_names_are_judged_as_by_fmpy(tmp_path: Path, name: str, is_legal: bool) -> None:
+    path = changed(fmu_path("Gain"), tmp_path / "G.fmu", with_text('name="gain"', f'name="{name}"'))
+    assert validate(path) == tuple(validate_fmu(str(path)))
+    assert (validate(path) == ()) == is_legal
 
 
 @pytest.mark.parametrize("fmi", VERSIONS)
