@@ -78,7 +78,7 @@ def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: 
     assert not wheel.name.endswith("-any.whl")
 
 
-@pytest.mark.parametrize("name", ["Oscillator", "Gain"])
+@pytest.mark.parametrize("name", [pytest.param("Oscillator", marks=pytest.mark.long), "Gain"])
 def test_a_library_compiled_twice_in_different_places_has_the_same_bytes(name: str, tmp_path: Path) -> None:
     # files that are optimized together, and files that are not
     elsewhere = tmp_path / "native"

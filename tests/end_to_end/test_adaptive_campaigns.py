@@ -137,7 +137,7 @@ def test_the_borders_of_a_map_are_those_of_a_uniform_one_but_for_islands_between
     assert 2 * runs(adaptive) < runs(uniform)
 
 
-@pytest.mark.parametrize("plane", [False, True], ids=["path", "plane"])
+@pytest.mark.parametrize("plane", [False, pytest.param(True, marks=pytest.mark.long)], ids=["path", "plane"])
 def test_an_adaptive_campaign_is_the_same_bit_for_bit_with_any_workers_and_after_kill_9(
     plane: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

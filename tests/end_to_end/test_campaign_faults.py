@@ -274,6 +274,7 @@ def test_a_point_that_kills_its_process_is_a_row_that_says_so(tmp_path: Path) ->
     assert rows.sizes["run"] == 60
 
 
+@pytest.mark.long
 def test_an_innocent_point_is_computed_however_often_its_worker_is_taken_away(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(amplitude_text(60, start=-0.005))

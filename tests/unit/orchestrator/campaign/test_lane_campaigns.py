@@ -71,7 +71,9 @@ def test_a_campaign_in_lanes_that_is_interrupted_has_the_bits_of_one_that_is_not
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and sessions")
-@pytest.mark.parametrize(("path", "points"), [("independent", 12), ("up-down", 6)])
+@pytest.mark.parametrize(
+    ("path", "points"), [("independent", 12), pytest.param("up-down", 6, marks=pytest.mark.long)]
+)
 def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lanes(
     path: str, points: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
