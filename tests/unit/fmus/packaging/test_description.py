@@ -167,9 +167,10 @@ def test_fmpy_finds_nothing_wrong_with_either_version(
         text = model_description(component.with_repeats(repeats), fmi)
         (tmp_path / "modelDescription.xml").write_text(text, encoding="utf-8")
         names = component is small
-        read_model_description(
+        read = read_model_description(
             str(tmp_path), validate_variable_names=names, validate_model_structure=True
-        )  # or it raises
+        )
+        assert read.modelName == component.name
 
 
 def test_fewer_contacts_leave_the_other_value_references_alone(small: ComponentDescription) -> None:
