@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -19,11 +20,13 @@ import dask
 from distributed import Client as Client
 from distributed import LocalCluster
 from distributed.security import Security
+from distributed.utils import get_mp_context
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
 from vibroimpact.fmus.wording import option, typed_or_called
+from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.processors import processor_count
@@ -56,8 +59,10 @@ QUIET: dict[str, Any] = {
     # A chunk whose worker died twice is handed back, so that the campaign can find the point that kills.
     "distributed.scheduler.allowed-failures": 1,
     "logging": {"distributed": "critical"},
+    # Elsewhere than on Linux what system libraries do in a process may not outlive a fork.
+    "distributed.worker.multiprocessing-method": "forkserver" if sys.platform == "linux" else "spawn",
 }
-"""Settings of Dask that switch off or slow down what it does beside the work."""
+"""Settings of Dask that switch off or slow down what it does beside the work, and how it starts workers."""
 
 
 @contextmanager
@@ -182,6 +187,7 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
     for _ in range(MOST_STARTS):
         try:
             with interrupts_blocked():
+                _prepare_forks()
                 return LocalCluster(
                     n_workers=workers,
                     threads_per_worker=1,
@@ -194,6 +200,8 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
                     security=_own_certificates(scratch),
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
+                    # What workers are forked from has the environment of when it was started.
+                    env=dict(os.environ),
                 )
         except RuntimeError as error:
             failure = error
@@ -202,6 +210,13 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
         f"Is there memory for them? With {option('workers')} there are fewer; "
         f"the same {typed_or_called('command', 'call')} tries again."
     ) from failure
+
+
+def _prepare_forks() -> None:
+    """Name what the process that workers are forked from imports, once for all of them: it takes 2 s."""
+    context = get_mp_context()
+    if context.get_start_method() == "forkserver":
+        context.set_forkserver_preload([Computation.__module__])
 
 
 def _own_certificates(folder: Path) -> Security:

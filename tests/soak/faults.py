@@ -23,7 +23,7 @@ import numpy as np
 import psutil
 import xarray as xr
 from support import fmu_factory
-from support.campaign_process import wait_until
+from support.campaign_process import fork_servers_of, wait_until, workers_of
 from support.command_line import ENTRY
 
 from soak import service_kills
@@ -124,7 +124,7 @@ class Command:
 
     def workers(self) -> list[psutil.Process]:
         """Return its worker processes."""
-        return [one for one in self.session() if one.ppid() == self.process.pid and _is_worker(one)]
+        return workers_of(self.process.pid)
 
     def runs_for(self, seconds: float) -> bool:
         """Wait so long; return whether it still runs."""
@@ -165,23 +165,16 @@ def _parts_there() -> set[str]:
     return {part.name for part in Path("campaign", "parts").glob("branch-*.nc")}
 
 
-def _is_worker(process: psutil.Process) -> bool:
-    try:
-        return "spawn_main" in " ".join(process.cmdline())
-    except psutil.Error:
-        return False
-
-
 # ---- rounds: None, or a problem ----
 
 
 def _workers(chance: random.Random, seconds: float) -> str | None:
-    """Kill and stop workers, and now and then stop all processes, as Ctrl-Z and a lid do."""
+    """Kill and stop workers and what they are forked from; stop all processes now and then, as Ctrl-Z and a lid do."""
     command, end = _begun(), time.monotonic() + seconds
     while command.runs_for(min(chance.expovariate(0.5), end - time.monotonic())):
         if time.monotonic() >= end:
             break
-        workers = command.workers()
+        workers = command.workers() + fork_servers_of(command.process.pid)
         draw = chance.random()
         if workers and draw < 0.4:
             _signal([chance.choice(workers)], signal.SIGKILL)

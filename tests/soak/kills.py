@@ -12,6 +12,7 @@ from pathlib import Path
 
 import psutil
 import xarray as xr
+from support.campaign_process import workers_of
 from support.campaign_scenes import TIMING, frequency_text
 from support.places import TESTS
 
@@ -134,19 +135,11 @@ def _kill_some(process: subprocess.Popen[str], chance: random.Random) -> None:
             return
         except subprocess.TimeoutExpired:
             pass
-        victims = _workers(process.pid)
+        victims = sorted(worker.pid for worker in workers_of(process.pid))
         if chance.random() < 1 / 6:
             process.kill()
         elif victims:
             _kill(chance.choice(victims))
-
-
-def _workers(command: int) -> list[int]:
-    try:
-        children = psutil.Process(command).children()
-        return sorted(child.pid for child in children if "spawn_main" in " ".join(child.cmdline()))
-    except psutil.Error:
-        return []
 
 
 def _kill(process: int) -> None:

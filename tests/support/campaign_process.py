@@ -22,6 +22,32 @@ def hear_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def workers_of(command: int) -> list[psutil.Process]:
+    """Return the living worker processes of a campaign: what its server of forks has forked."""
+    try:
+        return [
+            worker for server in fork_servers_of(command) for worker in server.children() if _lives(worker)
+        ]
+    except psutil.NoSuchProcess:
+        return []
+
+
+def fork_servers_of(command: int) -> list[psutil.Process]:
+    """Return the living processes that workers of a campaign are forked from: one, or none yet."""
+    try:
+        children = psutil.Process(command).children()
+        return [child for child in children if "multiprocessing.forkserver" in " ".join(child.cmdline())]
+    except psutil.NoSuchProcess:
+        return []
+
+
+def _lives(process: psutil.Process) -> bool:
+    try:
+        return process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
 class CampaignProcess:
     """`vibroimpact campaign SCENE -o FOLDER` with a runner from `busy_runner`."""
 
@@ -53,11 +79,7 @@ class CampaignProcess:
 
     def workers(self) -> list[psutil.Process]:
         """Return the worker processes."""
-        return [
-            process
-            for process in self.members()
-            if process.ppid() == self.process.pid and "spawn_main" in " ".join(process.cmdline())
-        ]
+        return workers_of(self.process.pid)
 
     def parts(self) -> list[Path]:
         """Return the complete parts."""
