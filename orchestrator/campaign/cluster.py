@@ -9,6 +9,7 @@ import logging
 import os
 import signal
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -41,6 +42,8 @@ STOP_SECONDS = 3.0
 MOST_STARTS = 5
 """Starts of the workers of this machine that may fail before that is an error."""
 
+START = "distributed.worker.multiprocessing-method"
+
 QUIET: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.memory.target": False,
@@ -59,10 +62,11 @@ QUIET: dict[str, Any] = {
     # A chunk whose worker died twice is handed back, so that the campaign can find the point that kills.
     "distributed.scheduler.allowed-failures": 1,
     "logging": {"distributed": "critical"},
-    # Elsewhere than on Linux what system libraries do in a process may not outlive a fork.
-    "distributed.worker.multiprocessing-method": "forkserver" if sys.platform == "linux" else "spawn",
 }
-"""Settings of Dask that switch off or slow down what it does beside the work, and how it starts workers."""
+"""Settings of Dask that switch off or slow down what it does beside the work."""
+
+LONGEST_TEMPORARY = 75
+"""Bytes of the path of a temporary folder beyond which no socket in it has a name: Linux takes 107."""
 
 
 @contextmanager
@@ -97,7 +101,9 @@ def open_workers(
         if scheduler is None:
             stack.enter_context(safe_module_path())
             scratch = stack.enter_context(ScratchFolder("workers"))
-            stack.enter_context(dask.config.set({"temporary-directory": scratch.name}))
+            stack.enter_context(
+                dask.config.set({"temporary-directory": scratch.name, START: _prepare_start()})
+            )
             connect = partial(_embedded_cluster, workers or processor_count(), Path(scratch.name))
             where = "this machine"
         else:
@@ -187,7 +193,6 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
     for _ in range(MOST_STARTS):
         try:
             with interrupts_blocked():
-                _prepare_forks()
                 return LocalCluster(
                     n_workers=workers,
                     threads_per_worker=1,
@@ -205,6 +210,8 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
                 )
         except RuntimeError as error:
             failure = error
+            # What they are forked from may be out of reach: somebody has cleaned the folder of its socket.
+            dask.config.set({START: "spawn"})
     raise CampaignError(
         f"this machine: expected {workers} workers that start, got a failure {MOST_STARTS} times: {failure}. "
         f"Is there memory for them? With {option('workers')} there are fewer; "
@@ -212,11 +219,15 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
     ) from failure
 
 
-def _prepare_forks() -> None:
-    """Name what the process that workers are forked from imports, once for all of them: it takes 2 s."""
-    context = get_mp_context()
-    if context.get_start_method() == "forkserver":
-        context.set_forkserver_preload([Computation.__module__])
+def _prepare_start() -> str:
+    """Return how workers start: forked from one process, which is told here what to import for all of them, in 2 s."""
+    # Elsewhere than on Linux what system libraries do in a process may not outlive a fork.
+    if sys.platform != "linux" or len(os.fsencode(tempfile.gettempdir())) > LONGEST_TEMPORARY:
+        return "spawn"
+    with dask.config.set({START: "forkserver"}):
+        # Dask names packages the first time that it is asked: ours take their place.
+        get_mp_context().set_forkserver_preload([Computation.__module__])
+    return "forkserver"
 
 
 def _own_certificates(folder: Path) -> Security:

@@ -23,29 +23,34 @@ def hear_interrupts() -> None:
 
 
 def workers_of(command: int) -> list[psutil.Process]:
-    """Return the living worker processes of a campaign: what its server of forks has forked."""
-    try:
-        return [
-            worker for server in fork_servers_of(command) for worker in server.children() if _lives(worker)
-        ]
-    except psutil.NoSuchProcess:
-        return []
+    """Return the living worker processes of a campaign: forked from one process, or started one by one."""
+    forked = [
+        worker
+        for server in fork_servers_of(command)
+        for worker in _children(server.pid, "multiprocessing.forkserver")
+    ]
+    return forked + _children(command, "multiprocessing.spawn")
 
 
 def fork_servers_of(command: int) -> list[psutil.Process]:
     """Return the living processes that workers of a campaign are forked from: one, or none yet."""
+    return _children(command, "multiprocessing.forkserver")
+
+
+def _children(parent: int, kind: str) -> list[psutil.Process]:
     try:
-        children = psutil.Process(command).children()
-        return [child for child in children if "multiprocessing.forkserver" in " ".join(child.cmdline())]
+        children = psutil.Process(parent).children()
     except psutil.NoSuchProcess:
         return []
+    return [child for child in children if kind in _living_command(child)]
 
 
-def _lives(process: psutil.Process) -> bool:
+def _living_command(process: psutil.Process) -> str:
+    """Return the command line of a process; nothing of one that has ended."""
     try:
-        return process.status() != psutil.STATUS_ZOMBIE
+        return "" if process.status() == psutil.STATUS_ZOMBIE else " ".join(process.cmdline())
     except psutil.NoSuchProcess:
-        return False
+        return ""
 
 
 class CampaignProcess:
