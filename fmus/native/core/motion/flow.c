@@ -238,39 +238,70 @@ static const double FOURTH[VI_SERIES_ORDER + 1] = {
     0.0,    0.0,     0.0,     0.0,     24.0,    120.0,   360.0,   840.0,   1680.0,  3024.0,  5040.0,
     7920.0, 11880.0, 17160.0, 24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
 
-/* Taylor coefficients from the differential equation itself. */
-static void start_series(vi_segment *s, double x, double v)
+/* Modes whose coefficients are found side by side: each of a mode waits for the one before it. */
+enum { ABREAST = 8 };
+
+/* By n, then by mode. */
+typedef double coefficients[VI_SERIES_ORDER + 1][ABREAST];
+
+/* Taylor coefficients of `count` modes from the differential equation itself. */
+static inline void find_coefficients(coefficients c, const vi_segment s[], const double x[], const double v[],
+                                     const int count)
 {
-    const vi_mode *mode = s->mode;
-    const double w = mode->angular_frequency;
-    double drive[2] = {mode->force * s->phase.cosine, -mode->force * w * s->phase.sine};
-    double *c = s->coefficient;
-    s->origin = x;
-    c[0] = 0.0;
-    c[1] = v;
+    double drive[2][ABREAST], held[3][ABREAST] = {{0.0}}, rate[ABREAST], damping[ABREAST], stiffness[ABREAST];
+    for (int i = 0; i < count; ++i) {
+        const vi_mode *mode = s[i].mode;
+        rate[i] = mode->angular_frequency;
+        damping[i] = 2.0 * mode->decay;
+        stiffness[i] = mode->stiffness;
+        drive[0][i] = mode->force * s[i].phase.cosine;
+        drive[1][i] = -mode->force * rate[i] * s[i].phase.sine;
+        held[0][i] = s[i].held - stiffness[i] * x[i];
+        held[1][i] = s[i].held_rate;
+        c[0][i] = 0.0;
+        c[1][i] = v[i];
+    }
     for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
-        const double k = (double)n, share = SHARE[n];
-        const double held = n == 0 ? s->held - mode->stiffness * x : n == 1 ? s->held_rate : 0.0;
-        const double load = drive[0] + held - 2.0 * mode->decay * (k + 1.0) * c[n + 1] - mode->stiffness * c[n];
-        c[n + 2] = load * share;
-        const double next = -drive[0] * w * w * share;
-        drive[0] = drive[1];
-        drive[1] = next;
+        const double next = (double)n + 1.0, share = SHARE[n];
+        const double *constant = held[n < 2 ? n : 2];
+        double *load = drive[n % 2];
+        for (int i = 0; i < count; ++i) {
+            const double sum = load[i] + constant[i] - damping[i] * next * c[n + 1][i] - stiffness[i] * c[n][i];
+            c[n + 2][i] = sum * share;
+            load[i] = -load[i] * rate[i] * rate[i] * share;
+        }
     }
 }
 
-static void bound_series(vi_segment *s)
+static inline void begin_series(vi_segment s[], const double x[], const double v[], const int count)
 {
-    const double *c = s->coefficient;
-    double snap = 0.0, scale = 0.0;
+    coefficients c;
+    double snap[ABREAST] = {0.0}, scale[ABREAST] = {0.0}, length[ABREAST];
+    find_coefficients(c, s, x, v, count);
+    for (int i = 0; i < count; ++i) {
+        const double fastest = s[i].mode->fastest;
+        length[i] = fastest > 0.0 ? fmin(s[i].length, SERIES_REACH / fastest) : s[i].length;
+    }
     for (int n = VI_SERIES_ORDER; n >= 4; --n) {
-        snap = snap * s->length + FOURTH[n] * fabs(c[n]);
+        for (int i = 0; i < count; ++i) {
+            snap[i] = snap[i] * length[i] + FOURTH[n] * fabs(c[n][i]);
+            scale[i] = scale[i] * length[i] + fabs(c[n][i]);
+        }
     }
-    for (int n = VI_SERIES_ORDER; n >= 0; --n) {
-        scale = scale * s->length + fabs(c[n]);
+    for (int n = 3; n >= 0; --n) {
+        for (int i = 0; i < count; ++i) {
+            scale[i] = scale[i] * length[i] + fabs(c[n][i]);
+        }
     }
-    s->series_snap_bound = snap;
-    s->scale = scale;
+    for (int i = 0; i < count; ++i) {
+        s[i].origin = x[i];
+        s[i].length = length[i];
+        s[i].series_snap_bound = snap[i];
+        s[i].scale = scale[i];
+        for (int n = 0; n <= VI_SERIES_ORDER; ++n) {
+            s[i].coefficient[n] = c[n][i];
+        }
+    }
 }
 
 static void series_at(const vi_segment *s, double u, vi_motion *m)
@@ -296,6 +327,10 @@ static void series_part(const vi_segment *s, double u, vi_part *part)
 {
     const double *c = s->coefficient;
     double x = c[VI_SERIES_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
+    if (u == 0.0) {
+        *part = (vi_part){c[0], c[1], 2.0 * c[2], 6.0 * c[3], s->series_snap_bound, s->scale};
+        return;
+    }
     for (int n = VI_SERIES_ORDER - 1; n >= 0; --n) {
         j = j * u + a;
         a = a * u + v;
@@ -351,8 +386,9 @@ void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *
                                     : homogeneous_bound(segment, 1.0, 1.0, segment->x, segment->v) + mode->steady_snap;
 }
 
-void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
-                      double held_rate, double length, bool local)
+/* What is known of a segment before its form is. */
+static void set_out(vi_segment *segment, const vi_mode *mode, vi_phase phase, double held, double held_rate,
+                    double length)
 {
     segment->mode = mode;
     segment->origin = 0.0;
@@ -361,17 +397,35 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
     segment->held_rate = held_rate;
     segment->length = length;
     segment->since = segment->since_low = 0.0;
+}
+
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
+                      double held_rate, double length, bool local)
+{
+    set_out(segment, mode, phase, held, held_rate, length);
     segment->series = local || !split(segment, x, v);
     if (segment->series) {
-        if (mode->fastest > 0.0) {
-            segment->length = fmin(length, SERIES_REACH / mode->fastest);
-        }
-        start_series(segment, x, v);
-        bound_series(segment);
+        begin_series(segment, &x, &v, 1);
     } else {
         segment->start = segment->x;
         segment->start_rate = segment->v;
         bound_split(segment);
+    }
+}
+
+void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[], const double v[],
+                             vi_phase phase, const double held[], const double held_rate[], double length)
+{
+    int j = 0;
+    for (; j < count; ++j) {
+        set_out(&segments[j], &modes[j], phase, held[j], held_rate[j], length);
+        segments[j].series = true;
+    }
+    for (j = 0; j + ABREAST <= count; j += ABREAST) {
+        begin_series(&segments[j], &x[j], &v[j], ABREAST);
+    }
+    for (; j < count; ++j) {
+        begin_series(&segments[j], &x[j], &v[j], 1);
     }
 }
 
@@ -394,12 +448,28 @@ void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
     }
 }
 
-void vi_segment_end(const vi_segment *segment, double u, double phase, double *x, double *v)
+/* As the series of a part gives them. */
+static void series_end(const vi_segment *s, double u, double *displacement, double *velocity)
 {
+    const double *c = s->coefficient;
+    double x = c[VI_SERIES_ORDER], v = 0.0;
+    for (int n = VI_SERIES_ORDER - 1; n >= 0; --n) {
+        v = v * u + x;
+        x = x * u + c[n];
+    }
+    *displacement = s->origin + x;
+    *velocity = v;
+}
+
+void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, double *x, double *v)
+{
+    if (segment->series) {
+        series_end(segment, u, x, v);
+        return;
+    }
     const vi_mode *mode = segment->mode;
-    const double w = mode->angular_frequency;
+    const double w = mode->angular_frequency, c = phase.cosine, sn = phase.sine;
     const propagator p = propagate_segment(segment, u);
-    const double c = cos(phase), sn = sin(phase);
     *x = (p.e_cos + mode->decay * p.e_sin) * segment->x + p.e_sin * segment->v
          + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);
     *v = -mode->stiffness * p.e_sin * segment->x + p.back * segment->v

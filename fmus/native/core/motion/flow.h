@@ -84,6 +84,10 @@ void vi_mode_drive(vi_mode *mode, double force, double angular_frequency);
 void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
                       double held_rate, double length, bool local);
 
+/* Begin local segments of several modes at one instant, each as one alone is begun. */
+void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[], const double v[],
+                             vi_phase phase, const double held[], const double held_rate[], double length);
+
 /* Count the homogeneous part of a split segment, whose mode is underdamped, from its state (x, v), of that
  * amplitude, `since` seconds (with their rounding) before the start, on the same motion: what rounding has added meanwhile is left behind. */
 void vi_segment_continue(vi_segment *segment, double x, double v, double amplitude, double since, double since_low);
@@ -103,8 +107,9 @@ void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion);
  * Bodies of many modes add these up. At the start it is what the segment was begun with: no evaluation. */
 void vi_segment_part(const vi_segment *segment, double u, vi_part *part);
 
-/* Displacement and velocity after any u, the forcing phase there being known exactly (used for long free flights). */
-void vi_segment_end(const vi_segment *segment, double u, double phase, double *x, double *v);
+/* Displacement and velocity after any u within a series, of a split segment after any u at all: the forcing phase there
+ * is known exactly. */
+void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, double *x, double *v);
 
 /* Bounds of the displacement for all later time; false when there are none (series form, sloping input). */
 bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest);

@@ -12,9 +12,14 @@ void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const d
     flight->angular_frequency = model->clock.angular_frequency;
     flight->length = length;
     flight->series = false;
+    if (local) {
+        vi_segments_start_local(flight->segment, model->mode, vi_structure_modes(model), q, p, phase, held, held_rate, length);
+    }
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         vi_segment *segment = &flight->segment[j];
-        vi_segment_start(segment, &model->mode[j], q[j], p[j], phase, held[j], held_rate[j], length, local);
+        if (!local) {
+            vi_segment_start(segment, &model->mode[j], q[j], p[j], phase, held[j], held_rate[j], length, false);
+        }
         flight->length = vi_min(flight->length, segment->length);
         flight->series = flight->series || segment->series;
     }
@@ -120,16 +125,9 @@ bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *larg
 
 void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], double p[])
 {
+    const vi_phase phase = vi_phase_of(angle);
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
-        const vi_segment *segment = &flight->segment[j];
-        if (segment->series) {
-            vi_part part;
-            vi_segment_part(segment, u, &part);
-            q[j] = segment->origin + part.x;
-            p[j] = part.v;
-        } else {
-            vi_segment_end(segment, u, angle, &q[j], &p[j]);
-        }
+        vi_segment_end(&flight->segment[j], u, phase, &q[j], &p[j]);
     }
 }
 
