@@ -61,16 +61,25 @@ class _Answers:
     def put(self, message: Any, *, last: bool = True) -> None:
         """Answer; `last`: nothing more comes of what was to be run."""
         self._unread += 1
-        left = memoryview(packed(message))
+        left = packed(message)
         with contextlib.suppress(BlockingIOError):
-            left = left[os.write(self._pipe, left) :]
+            left = self._written(left)
         if last or left:
             self._ring(last)
         if left:
             os.set_blocking(self._pipe, True)
             while left:
-                left = left[os.write(self._pipe, left) :]
+                left = self._written(left)
             os.set_blocking(self._pipe, False)
+
+    def _written(self, rows: list[memoryview]) -> list[memoryview]:
+        """Write what there is room for; return what is left."""
+        count = os.writev(self._pipe, rows) if hasattr(os, "writev") else os.write(self._pipe, rows[0])
+        for number, row in enumerate(rows):
+            if count < len(row):
+                return [row[count:], *rows[number + 1 :]]
+            count -= len(row)
+        return []
 
     def _ring(self, last: bool) -> None:
         if self._bell is not None:

@@ -1,7 +1,7 @@
 """What a guard and its child say to each other: messages with their length in front.
 
 Both ends are this package in processes of one user; nothing else can write to these pipes. Messages are pickled,
-but for records, of which there is one for each point: packed by their fields they take a quarter of the time.
+but for records, of which there is one for each point: their arrays come after them as they lie in memory.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from operator import attrgetter
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.scene import Scene
@@ -59,17 +60,30 @@ _ARRAYS = ("periods", "impacts", "sticks", "samples", "events", "energy_residual
 _arrays_of = attrgetter(*_ARRAYS)
 
 
-def _packed_record(record: RunRecord) -> bytes:
-    """Return the bytes of a record: its numbers, what else there is, and its arrays of float64."""
-    arrays = [None if array is None else (array.shape, array.tobytes()) for array in _arrays_of(record)]
+def _packed_record(record: RunRecord) -> list[memoryview]:
+    """Return what a record is sent as: its head with its numbers and what else there is, then its arrays of float64."""
+    arrays = [None if array is None else np.ascontiguousarray(array) for array in _arrays_of(record)]
+    shapes = [None if array is None else array.shape for array in arrays]
     numbers = _NUMBERS.pack(*_numbers_of(record))
     residual = None if record.loop_residual is None else float(record.loop_residual)
-    return marshal.dumps((numbers, record.message, residual, arrays))
+    data = marshal.dumps((numbers, record.message, residual, shapes))
+    head = memoryview(HEAD.pack(len(data), True) + data)
+    return [head, *(_bytes_of(array) for array in arrays if array is not None and array.size)]
 
 
-def _unpacked_record(data: bytes) -> RunRecord:
-    numbers, message, residual, arrays = marshal.loads(data)
+def _bytes_of(array: NDArray[np.float64]) -> memoryview:
+    return array.reshape(-1).view(np.uint8).data
+
+
+def _received_record(data: bytes, pipe: IO[bytes]) -> RunRecord | None:
+    """Return the record that begins with `data`, its arrays read from the pipe; None where they are not whole."""
+    numbers, message, residual, shapes = marshal.loads(data)
     outcome, displacement, velocity, phase, seconds = _NUMBERS.unpack(numbers)
+    arrays: dict[str, NDArray[np.float64] | None] = {}
+    for name, shape in zip(_ARRAYS, shapes, strict=True):
+        arrays[name] = array = None if shape is None else np.empty(shape)
+        if array is not None and array.size and _read_into(pipe, array) < array.nbytes:
+            return None
     return RunRecord(
         Outcome(outcome),
         message,
@@ -78,23 +92,26 @@ def _unpacked_record(data: bytes) -> RunRecord:
         final_phase=phase,
         seconds=seconds,
         loop_residual=residual,
-        **{
-            name: None if array is None else np.frombuffer(array[1]).reshape(array[0]).copy()
-            for name, array in zip(_ARRAYS, arrays, strict=True)
-        },
+        **arrays,
     )
 
 
-def packed(message: Any) -> bytes:
-    """Return the bytes of a message: a record, an object of this module, or a tuple of points."""
-    is_record = isinstance(message, RunRecord)
-    data = _packed_record(message) if is_record else pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    return HEAD.pack(len(data), is_record) + data
+def _read_into(pipe: IO[bytes], array: NDArray[np.float64]) -> int:
+    """Fill an array from a pipe; return how many bytes there were."""
+    return pipe.readinto(_bytes_of(array)) or 0  # type: ignore[attr-defined]  # of all pipes, not of all IO
+
+
+def packed(message: Any) -> list[memoryview]:
+    """Return the bytes of a message, in rows: of a record, an object of this module, or a tuple of points."""
+    if isinstance(message, RunRecord):
+        return _packed_record(message)
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    return [memoryview(HEAD.pack(len(data), False) + data)]
 
 
 def send(pipe: IO[bytes], message: Any) -> None:
     """Write one message."""
-    pipe.write(packed(message))
+    pipe.writelines(packed(message))
     pipe.flush()
 
 
@@ -107,4 +124,4 @@ def receive(pipe: IO[bytes]) -> Any:
     data = pipe.read(size) or b""
     if len(data) < size:
         return None
-    return _unpacked_record(data) if is_record else pickle.loads(data)
+    return _received_record(data, pipe) if is_record else pickle.loads(data)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import select
 import subprocess
+import sys
 import threading
 from functools import partial
 from typing import IO, Any
@@ -15,8 +17,19 @@ from vibroimpact.orchestrator.guard.pipe import BELL, Order, receive, send
 
 #: A process that can wait for a bell runs points in batches; elsewhere a thread reads the answers one by one.
 HAS_BELL = os.name == "posix"
+#: Of the pipe of answers, bytes: what Linux allows to everybody.
+PIPE_SIZE = 1 << 20
 #: What a child that is to end may take, s: longer than its supervisor takes to end all that an FMU has started.
 END_TIME = 10.0
+
+
+def _enlarge(pipe: IO[bytes]) -> None:
+    """Let a pipe hold many answers, where the system allows it: who writes to a full one waits for its reader."""
+    if sys.platform == "linux":
+        import fcntl  # POSIX only
+
+        with contextlib.suppress(PermissionError):
+            fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, PIPE_SIZE)
 
 
 class PointProcess:
@@ -32,6 +45,8 @@ class PointProcess:
             start_new_session=True,  # Ctrl-C reaches all processes of a terminal's session: it is the parent's
             pass_fds=(bell,) if HAS_BELL else (),
         )
+        assert self._process.stdout is not None
+        _enlarge(self._process.stdout)
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._reader: threading.Thread | None = None
         if HAS_BELL:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import io
+import os
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.orchestrator.guard.pipe import HEAD, Failure, Order, receive, send
+from vibroimpact.orchestrator.guard.child import _Answers
+from vibroimpact.orchestrator.guard.pipe import BELL, HEAD, Failure, Order, receive, send
+from vibroimpact.orchestrator.guard.point_process import HAS_BELL
 from vibroimpact.orchestrator.scene import parse_scene
 
 FREE = "[body]\nmass = 1\nstiffness = 1\n[record]\nrecorded_time = 5"
@@ -59,3 +63,28 @@ def test_a_record_arrives_with_every_bit_of_its_arrays_which_may_be_written() ->
             assert value.flags.writeable
         else:
             np.testing.assert_equal(value, expected)
+
+
+@pytest.mark.parametrize("missing", [1, 7, 8, 96, 97, 200])
+def test_a_record_that_was_cut_off_is_none(missing: int) -> None:
+    whole = sent(RunRecord(Outcome.ok, "", periods=np.ones((2, 5)), impacts=np.ones((3, 4))))
+    assert receive(io.BytesIO(whole[:-missing])) is None
+
+
+@pytest.mark.skipif(not HAS_BELL, reason="answers are read one by one where there is no bell")
+def test_answers_larger_than_the_pipe_are_read_whole_while_they_are_written() -> None:
+    ends, bell = os.pipe(), os.pipe()
+    answers = _Answers(ends[1], bell[1])
+    record = RunRecord(
+        Outcome.ok, "", periods=np.zeros((1, 5)), impacts=np.random.default_rng(1).random((9999, 9))
+    )
+    with ThreadPoolExecutor(1) as pool, os.fdopen(ends[0], "rb") as pipe:
+        writing = pool.submit(lambda: [answers.put(record, last=number == 3) for number in range(4)])
+        received, last = [], False
+        while not last:
+            count, last = BELL.unpack(os.read(bell[0], BELL.size))
+            received += [receive(pipe) for _ in range(count)]
+        writing.result()
+    assert [one.impacts.tobytes() for one in received] == 4 * [record.impacts.tobytes()]
+    for end in (ends[1], *bell):
+        os.close(end)
