@@ -13,7 +13,7 @@ POINTS = 150
 ROUNDS = ["workers killed and stopped", "damaged parts"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be stopped here")
 def test_a_disturbed_campaign_of_misbehaving_fmus_loses_and_blames_no_innocent_point(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -213,6 +213,7 @@ def test_an_overdriven_sweep_is_flagged_and_no_plateau_is_drawn(bench: Bench, tm
         assert "clipped, not drawn" in [line.get_label() for line in panel.lines]
 
 
+@pytest.mark.long
 def test_the_clock_error_of_the_inputs_comes_back(bench: Bench, tmp_path: Path) -> None:
     bench.control.set_clock_error(50.0)
     try:
