@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from distributed.security import Security
-from support.campaign_process import CampaignProcess, run_campaign_process, wait_until
+from support.campaign_process import CampaignProcess, fork_servers_of, run_campaign_process, wait_until
 from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, scene_of
 from support.places import TESTS
 
@@ -93,6 +93,23 @@ def test_a_campaign_survives_a_worker_that_is_killed(
     assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
     campaign.assert_nothing_lives()
     assert not list(scratch.rglob("*"))
+
+
+@independent
+@pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux alone")
+def test_a_campaign_survives_the_end_of_what_its_workers_are_forked_from(
+    uninterrupted: tuple[Path, Path], tmp_path: Path
+) -> None:
+    scene, expected = uninterrupted
+    campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO)
+    campaign.wait_for_parts(3)
+    (server,) = fork_servers_of(campaign.process.pid)
+    server.kill()
+    code, _, err = campaign.end()
+    assert code == 0, err
+    assert "2 workers were lost; what they had not finished was computed again." in err
+    assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
+    campaign.assert_nothing_lives()
 
 
 @pytest.mark.parametrize(
