@@ -28,8 +28,8 @@ class LazyStore(NetCDF4DataStore):
             self._file = take(path)
             try:
                 # these two of xarray carry no types
-                super().__init__(self._file.root)  # type: ignore[no-untyped-call]
-                self._loaded, self._encoding = super().load(), super().get_encoding()  # type: ignore[no-untyped-call]
+                super().__init__(self._file.root)  # type: ignore[no-untyped-call]  # of xarray
+                self._loaded, self._encoding = super().load(), super().get_encoding()  # type: ignore[no-untyped-call]  # of xarray
             except BaseException:
                 give_back(self._file)
                 raise

@@ -43,6 +43,7 @@ MOST_STARTS = 5
 """Starts of the workers of this machine that may fail before that is an error."""
 
 START = "distributed.worker.multiprocessing-method"
+"""Dask's setting of how workers start: `spawn` one by one, or forked by a `forkserver`."""
 
 QUIET: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
@@ -220,7 +221,7 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
 
 
 def _prepare_start() -> str:
-    """Return how workers start: forked from one process, which is told here what to import for all of them, in 2 s."""
+    """Return how workers start. Where they are forked from one process, it is told what to import for all of them."""
     # Elsewhere than on Linux what system libraries do in a process may not outlive a fork.
     if sys.platform != "linux" or len(os.fsencode(tempfile.gettempdir())) > LONGEST_TEMPORARY:
         return "spawn"

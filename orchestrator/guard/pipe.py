@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.scene import Scene
 
-#: Stands before each message: its length, and whether it is a record.
+#: Stands before each message: its length, without the arrays of a record, and whether it is one.
 HEAD = struct.Struct("<Q?")
 #: What a child says on its bell: how many answers there are to read, and whether they end what it was given to run.
 BELL = struct.Struct("<B?")

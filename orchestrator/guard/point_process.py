@@ -28,7 +28,7 @@ def _enlarge(pipe: IO[bytes]) -> None:
     if sys.platform == "linux":
         import fcntl  # POSIX only
 
-        with contextlib.suppress(PermissionError):
+        with contextlib.suppress(OSError):
             fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, PIPE_SIZE)
 
 

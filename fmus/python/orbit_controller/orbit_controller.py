@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 # found in the FMU's resources, whether or not it is installed; its types are not published
-from pythonfmu import (  # type: ignore[import-untyped, import-not-found, unused-ignore]
+from pythonfmu import (  # type: ignore[import-untyped, import-not-found, unused-ignore]  # has no types, and is not everywhere
     Boolean,
     Fmi2Causality,
     Fmi2Slave,
     Integer,
     Real,
 )
-from pythonfmu.enums import (  # type: ignore[import-untyped, import-not-found, unused-ignore]
+from pythonfmu.enums import (  # type: ignore[import-untyped, import-not-found, unused-ignore]  # has no types, and is not everywhere
     Fmi2Initial,
     Fmi2Variability,
 )
@@ -61,7 +61,7 @@ class Decision:
     kept: bool
 
 
-class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]
+class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no types, and is not everywhere
     """Answers the force of the next flight, as soon as an impact is told."""
 
     description = "Keeps an unstable periodic orbit by the forcing amplitude while its frequency changes"

@@ -11,12 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 # found in the FMU's resources, whether or not it is installed; its types are not published
-from pythonfmu import (  # type: ignore[import-untyped, import-not-found, unused-ignore]
+from pythonfmu import (  # type: ignore[import-untyped, import-not-found, unused-ignore]  # has no types, and is not everywhere
     Fmi2Causality,
     Fmi2Slave,
     Real,
 )
-from pythonfmu.enums import (  # type: ignore[import-untyped, import-not-found, unused-ignore]
+from pythonfmu.enums import (  # type: ignore[import-untyped, import-not-found, unused-ignore]  # has no types, and is not everywhere
     Fmi2Initial,
     Fmi2Variability,
 )
@@ -28,7 +28,7 @@ TRIAL_VELOCITY = 1.0
 Law = Callable[[float, float], float]
 
 
-class UserContactLaw(Fmi2Slave):  # type: ignore[misc, unused-ignore]
+class UserContactLaw(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no types, and is not everywhere
     """Answers the coefficient of restitution for the present inputs, as soon as they are set."""
 
     description = "A stop that answers a body's contact by a law written in Python"

@@ -244,7 +244,8 @@ enum { ABREAST = 8 };
 /* By n, then by mode. */
 typedef double coefficients[VI_SERIES_ORDER + 1][ABREAST];
 
-/* Taylor coefficients of `count` modes from the differential equation itself. */
+/* Taylor coefficients of `count` modes from the differential equation itself. Each caller gives a constant: loops over
+ * one mode are none, those over ABREAST are vectors. */
 static inline void find_coefficients(coefficients c, const vi_segment s[], const double x[], const double v[],
                                      const int count)
 {
@@ -273,6 +274,7 @@ static inline void find_coefficients(coefficients c, const vi_segment s[], const
     }
 }
 
+/* Begin the series of `count` modes whose segments are set out, with bounds up to their ends. */
 static inline void begin_series(vi_segment s[], const double x[], const double v[], const int count)
 {
     coefficients c;

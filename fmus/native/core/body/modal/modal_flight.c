@@ -13,7 +13,8 @@ void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const d
     flight->length = length;
     flight->series = false;
     if (local) {
-        vi_segments_start_local(flight->segment, model->mode, vi_structure_modes(model), q, p, phase, held, held_rate, length);
+        vi_segments_start_local(flight->segment, model->mode, vi_structure_modes(model), q, p, phase, held, held_rate,
+                                length);
     }
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         vi_segment *segment = &flight->segment[j];
