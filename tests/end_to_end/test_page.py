@@ -18,7 +18,7 @@ from vibroimpact.service.client import RemoteJob
 
 pytestmark = pytest.mark.slow
 SHORT = sweep_text(40, 50, "up")
-LONG = sweep_text(400, 60_000)
+LONG = sweep_text(400, 1_000_000)
 MAP = sweep_text(6, 20) + (
     '"stop[1].position" = { values = [0.0, 0.5, 1.0] }\n[execution]\nimpact_limit = 30\n'
 )

@@ -23,7 +23,7 @@ from vibroimpact.service.client import RemoteJob, Service, ServiceError
 
 pytestmark = pytest.mark.slow
 
-LONG = sweep_text(160, 20_000)
+LONG = sweep_text(160, 100_000)
 ENDLESS = """
 [scene]
 units = "nondimensional"

@@ -21,7 +21,7 @@ from vibroimpact.service.remote import RemoteJob, ServiceError
 
 pytestmark = pytest.mark.slow
 
-LONG = sweep_text(120, 20_000)
+LONG = sweep_text(120, 100_000)
 
 
 class Cutter:
