@@ -19,6 +19,9 @@ static const double SMALLEST_TERM = 0.01;
  * product of two of them overflows. */
 static const double LARGEST_COEFFICIENT = 1e140;
 
+/* What is given the numbers of contacts as constants has them only where it is inlined. */
+#define INLINE static inline __attribute__((always_inline))
+
 /* Rate at which the Taylor coefficients of no motion grow faster, rad/s. */
 static double fastest_rate(const vi_structure_model *model, const vi_drift_start *start)
 {
@@ -113,9 +116,10 @@ static double pressed_by_line(const vi_press *press, const double d[], int n)
 }
 
 /* Coefficient n of the forces of the contacts that yield. */
-static void press(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, vi_power_series power[])
+INLINE void press(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, int yielding,
+                  vi_power_series power[])
 {
-    for (int i = 0; i < e->yielding; ++i) {
+    for (int i = 0; i < yielding; ++i) {
         const int k = e->yields[i];
         const vi_press *law = &start->press[k];
         const double *d = drift->penetration[k];
@@ -126,53 +130,39 @@ static void press(vi_drift *drift, const equation *e, const vi_drift_start *star
 
 /* ---- the next coefficient of the motion ---- */
 
-/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The
- * numbers of contacts, and of those that yield, are constants where there is one. The contacts do not wait for the modes:
- * what the forces do to them is known from the compliances. */
-static inline void extend_beside(vi_drift *drift, const equation *restrict e, double drive, int n, double share,
-                                 int contacts, int yielding)
+/* Coefficient n of all that accelerates the modes but the contacts. */
+INLINE void load_modes(const vi_drift *drift, const equation *restrict e, double drive, int n, double *restrict load)
 {
     const double *restrict x = drift->modal[n], *restrict v = drift->modal[n + 1];
-    double *restrict next = drift->modal[n + 2], sum[VI_PORTS][VI_LANES];
     const double order = (double)(n + 1);
-    for (int k = 0; k < contacts; ++k) {
-        sum[k][0] = sum[k][1] = 0.0;
-    }
     for (int j = 0; j < e->width; j += VI_LANES) {
-        double load[VI_LANES];
         for (int i = 0; i < VI_LANES; ++i) {
-            load[i] = drive * e->force[j + i] - e->stiffness[j + i] * x[j + i] - order * (e->drag[j + i] * v[j + i]);
-        }
-        for (int k = 0; k < contacts; ++k) {
-            for (int i = 0; i < VI_LANES; ++i) {
-                sum[k][i] += e->toward[k][j + i] * load[i];
-            }
-        }
-        for (int y = 0; y < yielding; ++y) {
-            const double *restrict toward = &e->toward[e->yields[y]][j], force = drift->force[e->yields[y]][n];
-            for (int i = 0; i < VI_LANES; ++i) {
-                load[i] -= force * toward[i];
-            }
-        }
-        for (int i = 0; i < VI_LANES; ++i) {
-            next[j + i] = share * load[i];
+            load[j + i] = drive * e->force[j + i] - e->stiffness[j + i] * x[j + i]
+                          - order * (e->drag[j + i] * v[j + i]);
         }
     }
+}
+
+/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The
+ * contacts do not wait for the modes: what the forces do to them is known from the compliances. */
+INLINE void extend(vi_drift *drift, const equation *e, double drive, int n, double share, int contacts, int yielding)
+{
+    double load[VI_ROW], *restrict next = drift->modal[n + 2];
+    load_modes(drift, e, drive, n, load);
     for (int k = 0; k < contacts; ++k) {
-        double all = sum[k][0] + sum[k][1];
+        double all = vi_row_dot(e->toward[k], load, e->width);
         for (int y = 0; y < yielding; ++y) {
             all -= e->compliance[k][y] * drift->force[e->yields[y]][n];
         }
         drift->penetration[k][n + 2] = share * all;
     }
-}
-
-static void extend(vi_drift *drift, const equation *e, double drive, int n, double share)
-{
-    if (drift->model->contacts == 1 && e->yielding == 1) {
-        extend_beside(drift, e, drive, n, share, 1, 1);
-    } else {
-        extend_beside(drift, e, drive, n, share, drift->model->contacts, e->yielding);
+    for (int y = 0; y < yielding; ++y) {
+        vi_row_add(load, -drift->force[e->yields[y]][n], e->toward[e->yields[y]], e->width);
+    }
+    for (int j = 0; j < e->width; j += VI_LANES) {
+        for (int i = 0; i < VI_LANES; ++i) {
+            next[j + i] = share * load[j + i];
+        }
     }
 }
 
@@ -286,9 +276,10 @@ static void end_series(vi_drift *drift, int order)
 }
 
 /* Has a power law's series grown too steep to be continued beyond coefficient n + 2? */
-static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, const vi_power_series power[])
+INLINE bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, int contacts,
+                      const vi_power_series power[])
 {
-    for (int k = 0; k < drift->model->contacts; ++k) {
+    for (int k = 0; k < contacts; ++k) {
         if (start->press[k].kind == VI_PRESS_POWER
             && !(fabs(drift->penetration[k][n + 2]) < LARGEST_COEFFICIENT
                  && fabs(power[k].power) < LARGEST_COEFFICIENT)) {
@@ -315,39 +306,52 @@ static void start_series(vi_drift *drift, const equation *e, const vi_drift_star
     }
 }
 
+/* All coefficients of the series. */
+INLINE void find_series(vi_drift *drift, const equation *e, const vi_drift_start *start, vi_power_series power[],
+                        int contacts, int yielding)
+{
+    const vi_structure_model *model = drift->model;
+    const double w = model->clock.angular_frequency;
+    const bool any_held = contacts > yielding && e->any_held, apart = !model->coupled && !any_held;
+    double drive[2] = {start->cosine, -w * start->sine};
+    for (int n = 0; n + 2 <= VI_ORDER; ++n) {
+        const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
+        press(drift, e, start, n, yielding, power);
+        extend(drift, e, drive[0], n, share, contacts, yielding);
+        if (n < 2) {
+            vi_row_add(drift->modal[n + 2], share, e->held[n], e->width);
+        }
+        if (model->coupled) {
+            drag(drift, n, share);
+        }
+        if (any_held) {
+            hold(drift, e, start, n, share);
+        }
+        if (n < 2 || !apart) {
+            extend_penetrations(drift, e, n + 2);
+        }
+        drive[0] = drive[1];
+        drive[1] = next;
+        if (e->any_power && too_steep(drift, start, n, contacts, power)) {
+            end_series(drift, n + 1);
+            break;
+        }
+    }
+}
+
 void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, double length)
 {
     vi_power_series power[VI_PORTS];
     equation e;
-    const double w = model->clock.angular_frequency;
-    double drive[2] = {start->cosine, -w * start->sine};
     drift->model = model;
     drift->order = VI_ORDER;
     drift->rooted = 0;
     set_up(&e, model, start);
     start_series(drift, &e, start, power);
-    for (int n = 0; n + 2 <= VI_ORDER; ++n) {
-        const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
-        press(drift, &e, start, n, power);
-        extend(drift, &e, drive[0], n, share);
-        if (n < 2) {
-            vi_row_add(drift->modal[n + 2], share, e.held[n], e.width);
-        }
-        if (model->coupled) {
-            drag(drift, n, share);
-        }
-        if (e.any_held) {
-            hold(drift, &e, start, n, share);
-        }
-        if (n < 2 || model->coupled || e.any_held) {
-            extend_penetrations(drift, &e, n + 2);
-        }
-        drive[0] = drive[1];
-        drive[1] = next;
-        if (e.any_power && too_steep(drift, start, n, power)) {
-            end_series(drift, n + 1);
-            break;
-        }
+    if (model->contacts == 1 && e.yielding == 1) { /* the usual case: loops of one */
+        find_series(drift, &e, start, power, 1, 1);
+    } else {
+        find_series(drift, &e, start, power, model->contacts, e.yielding);
     }
     scale_of_holding(drift, start);
     const double fastest = fastest_rate(model, start);
@@ -357,21 +361,30 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
 
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[])
 {
-    const int modes = vi_structure_modes(drift->model), least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
+    const int modes = vi_structure_modes(drift->model), width = VI_WHOLE_LANES(modes);
+    const int least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
     const double r = vi_drift_variable(drift, u);
-    for (int j = 0; j < modes; j += VI_LANES) {
-        double x[VI_LANES], v[VI_LANES] = {0.0};
-        memcpy(x, &drift->modal[VI_ORDER][j], sizeof x);
+    double x[2][VI_LANES], v[2][VI_LANES];
+    for (int j = 0; j < width; j += 2 * VI_LANES) { /* two rows of lanes beside one another, as each waits for itself */
+        const int next = j + VI_LANES < width ? j + VI_LANES : j;
+        memset(v, 0, sizeof v);
+        memcpy(x[0], &drift->modal[VI_ORDER][j], sizeof x[0]);
+        memcpy(x[1], &drift->modal[VI_ORDER][next], sizeof x[1]);
         for (int n = VI_ORDER - 1; n >= least; --n) {
-            const double *c = &drift->modal[n][j];
+            const double *c = &drift->modal[n][j], *d = &drift->modal[n][next];
             for (int i = 0; i < VI_LANES; ++i) {
-                v[i] = v[i] * r + x[i];
-                x[i] = x[i] * r + c[i];
+                v[0][i] = v[0][i] * r + x[0][i];
+                x[0][i] = x[0][i] * r + c[i];
+            }
+            for (int i = 0; i < VI_LANES; ++i) {
+                v[1][i] = v[1][i] * r + x[1][i];
+                x[1][i] = x[1][i] * r + d[i];
             }
         }
-        for (int i = 0; i < VI_LANES && j + i < modes; ++i) {
-            q_end[j + i] = q[j + i] + (drift->rooted ? u * x[i] : x[i]);
-            p_end[j + i] = drift->rooted ? x[i] + 0.5 * r * v[i] : v[i];
+        for (int i = 0; i < 2 * VI_LANES && j + i < modes; ++i) {
+            const double sum = x[i / VI_LANES][i % VI_LANES], slope = v[i / VI_LANES][i % VI_LANES];
+            q_end[j + i] = q[j + i] + (drift->rooted ? u * sum : sum);
+            p_end[j + i] = drift->rooted ? sum + 0.5 * r * slope : slope;
         }
     }
 }
