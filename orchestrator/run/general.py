@@ -26,6 +26,10 @@ from vibroimpact.orchestrator.run.record import (
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
 
+NO_ROWS = np.empty((0, 3))
+#: What components that are counted from 0 are counted from 1 with, in rows of events.
+COUNTED_FROM_ONE = np.array([0.0, 0.0, 1.0])
+
 
 class GeneralRunner:
     """Runs points of one general scene in this process, with component instances that are used again.
@@ -67,7 +71,7 @@ class GeneralRunner:
         self._deadline = Deadline()
         self._build()
         self.fmu_hashes = {name: c.sha256 for name, c in self._importer.components.items()}
-        self._events: list[tuple[float, int, int]] = []
+        self._events: list[NDArray[np.float64]] = []  # rows of time, index and component, counted from 1
         self._recording = False
 
     def _build(self) -> None:
@@ -219,14 +223,15 @@ class GeneralRunner:
     def _note_late(self, events: NDArray[np.float64]) -> None:
         self._seen += len(events)
         if self._recording:
-            self._events += [(time, int(index), int(place) + 1) for time, index, place in events.tolist()]
+            self._events.append(events + COUNTED_FROM_ONE)
 
     def _note_event(self, event: Event) -> None:
         self._seen += 1
         if self._seen > self._limit:
             raise ImpactLimitReached
         if self._recording:
-            self._events.append((event.time, event.index, self._names.index(event.component) + 1))
+            row = (event.time, event.index, self._names.index(event.component))
+            self._events.append(np.array([row]) + COUNTED_FROM_ONE)
 
     def _record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
         return RunRecord(
@@ -234,7 +239,7 @@ class GeneralRunner:
             message=message,
             samples=None if self._sampler is None else self._sampler.rows,
             seconds=seconds,
-            events=in_time_order(np.array(self._events, dtype=np.float64).reshape(-1, 3))
+            events=in_time_order(np.concatenate([NO_ROWS, *self._events]))
             if self._scene.record.impacts
             else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,
