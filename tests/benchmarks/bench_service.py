@@ -20,6 +20,8 @@ from support.served import Served, sweep_text
 
 GOAL_MILLISECONDS = 100.0
 CLIENTS, SECONDS, REQUESTS = 50, 60.0, 10_000
+CAMPAIGN = 1_000_000, 20_000
+"""Points of the campaign beside which the clients ask, and periods of each: it outlasts them."""
 GOAL_GROWTH = 0.05
 """Of the memory of the service over all requests, relative."""
 
@@ -47,7 +49,7 @@ def main() -> int:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder, "scene.toml")
-        scene.write_text(sweep_text(200_000, 1000), encoding="utf-8")
+        scene.write_text(sweep_text(*CAMPAIGN), encoding="utf-8")
         served = Served(Path(folder, "service"))
         try:
             token = (served.folder / "token").read_text(encoding="utf-8").strip()
@@ -59,6 +61,10 @@ def main() -> int:
                 waits, errors = clients(f"{served.url}/api/v1/campaigns/{job.id}", headers, options.seconds)
                 job.refresh()
                 state, done = job.status["state"], job.status["done"]
+                if state != "running":
+                    raise RuntimeError(
+                        f"bench_service: expected a campaign that still runs, got one that is {state}"
+                    )
                 job.cancel()
             growth, rate = memory(served, headers, REQUESTS)
         finally:
