@@ -111,8 +111,8 @@ class Peer:
         return seconds / PEER_IMPACTS, abs(phase), abs(velocity - VELOCITY)
 
 
-def machine() -> dict[str, str]:
-    """Return the processor and the versions that the figures hold for."""
+def machine(*others: str) -> dict[str, str]:
+    """Return the processor and the versions, of other packages too, that the figures hold for."""
     model = platform.processor()
     if Path("/proc/cpuinfo").is_file():
         lines = Path("/proc/cpuinfo").read_text().splitlines()
@@ -123,7 +123,7 @@ def machine() -> dict[str, str]:
         compiler = told.splitlines()[0]
     except (OSError, subprocess.CalledProcessError):
         compiler = "unknown"
-    packages = {name: version(name) for name in ("numpy", "scipy")}
+    packages = {name: version(name) for name in ("numpy", "scipy", *others)}
     return {
         "processor": f"{model} ({platform.machine()})",
         "cores": str(os.cpu_count()),

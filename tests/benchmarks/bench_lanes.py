@@ -1,4 +1,4 @@
-"""Many points in lanes, in every instruction set of this machine, beside the fused Oscillator and scipy.
+"""Many points in lanes, in every instruction set of this machine, beside the fused Oscillator, scipy, diffrax and FMPy.
 
 P(1,1) of bench_fused, with its errors beside the times; chaos (r .8, no damping, F 1, stop 0, w 2.8); how the cost
 grows with modes, contacts, points and recorded periods. Timed in turns, by processor time; medians are compared.
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import statistics
 import sys
 import time
@@ -21,7 +22,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench_fused import PHASE, VELOCITY, Fused, Peer, machine
+from bench_fused import PERIOD, PHASE, VELOCITY, Fused, Peer, machine
+from peers import fmpy_import, jax_flights
+from peers.problems import orbit
+from peers.ways import Clock as Allowance
+from peers.ways import Way
 from support import lane_points
 from support.lane_points import IMPACT, TURN, Columns, drawn, run, taken
 
@@ -29,6 +34,8 @@ from vibroimpact.fmus.core import lanes
 from vibroimpact.fmus.core.lanes import Instructions, instructions
 
 POINTS = 64
+OTHER_IMPACTS = 100
+"""Of diffrax and FMPy, one in each period: their time per impact does not depend on their number."""
 HERE = [each for each in Instructions if each and instructions() >= each]
 
 
@@ -94,6 +101,36 @@ def counted(points: Columns, *, is_recorded: bool = False) -> Case:
     return Case(taken(points, kept), impacts, is_recorded)
 
 
+class Other:
+    """Another package on the same orbit, with a setting of about the error of RK45 at rtol 1e-6."""
+
+    def __init__(self, way: Way, setting: float) -> None:
+        self.name = f"{way.name}, {way.knob} {setting:g}"
+        self._run = way.open(orbit(OTHER_IMPACTS), setting, Allowance(600.0))
+
+    def run(self) -> tuple[float, float, float]:
+        """Return seconds per impact, and the errors of phase (rad) and velocity of the last impact."""
+        began = time.process_time()
+        found = self._run()
+        seconds = (time.process_time() - began) / found.share
+        if found.observation.failure or len(found.observation.impacts) != OTHER_IMPACTS:
+            raise RuntimeError(f"{self.name}: expected {OTHER_IMPACTS} impacts, got {found.observation}")
+        at, velocity = found.observation.impacts[-1, :2]
+        # the orbit begins half a period behind an impact
+        return (
+            seconds / OTHER_IMPACTS,
+            abs(math.remainder(at - 0.5 * PERIOD, PERIOD)),
+            abs(velocity - VELOCITY),
+        )
+
+
+def others() -> list[Peer | Other]:
+    """Return what is measured beside: scipy; diffrax, compiled, alone and vmapped; FMPy without and with CVode."""
+    compiled = [Other(way, 1e-6) for way in jax_flights.ways() if "Dopri8" in way.name]
+    stepped, _, integrated = fmpy_import.ways()
+    return [Peer(1e-6), *compiled, Other(stepped, 1.0), Other(integrated, 1e-6)]
+
+
 def errors() -> tuple[float, float]:
     """Return the largest errors of phase (rad) and velocity of the last impacts of P(1,1)."""
     rows = np.concatenate([each[each[:, 0] == IMPACT] for each in run(periodic(400, 4)).rows])
@@ -115,13 +152,17 @@ def cases(periods: int) -> dict[str, Case]:
     return found
 
 
-def measure(periods: int, repetitions: int) -> dict[str, float]:
-    """Time all in turns; returns median microseconds per impact by name."""
-    clock, fused, peer = Clock(), Fused(100_000), Peer(1e-6)
-    timed: dict[str, Callable[[], float]] = {
-        "fused Oscillator": lambda: fused.run()[0],
-        peer.name: lambda: peer.run()[0],
-    }
+def measure(periods: int, repetitions: int) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Time all in turns; returns median microseconds per impact, and the others' errors of phase and velocity."""
+    clock, fused, off = Clock(), Fused(100_000), {}
+    timed: dict[str, Callable[[], float]] = {"fused Oscillator": lambda: fused.run()[0]}
+
+    def timed_other(other: Peer | Other) -> float:
+        seconds, *off[other.name] = other.run()
+        return seconds
+
+    for other in others():
+        timed[other.name] = lambda other=other: timed_other(other)  # type: ignore[misc]
     for name, case in cases(periods).items():
         for chosen in HERE:
             timed[f"{name} ({chosen.name})"] = lambda case=case, chosen=chosen: case.seconds(clock, chosen)  # type: ignore[misc]
@@ -129,7 +170,8 @@ def measure(periods: int, repetitions: int) -> dict[str, float]:
     for turn in range(repetitions):
         for name in timed if turn % 2 == 0 else reversed(list(timed)):
             seconds[name].append(timed[name]())
-    return {name: 1e6 * statistics.median(each) for name, each in seconds.items()}
+    found = {name: 1e6 * statistics.median(each) for name, each in seconds.items()}
+    return found, {name: (phase, velocity) for name, (phase, velocity) in off.items()}
 
 
 def main() -> int:
@@ -139,14 +181,15 @@ def main() -> int:
     parser.add_argument("--repetitions", type=int, default=7)
     parser.add_argument("--output", type=Path, default=None)
     options = parser.parse_args()
-    found, host = measure(options.periods, options.repetitions), machine()
+    jax_flights.one_thread()
+    (found, off), host = measure(options.periods, options.repetitions), machine("diffrax", "jax", "fmpy")
     best = HERE[-1].name
     ratio = found["solve_ivp RK45, rtol 1e-06, events"] / found[f"P(1,1) ({best})"]
     phase, velocity = errors()
     print("; ".join(f"{key} {value}" for key, value in host.items()))
-    print(f"{'':60}{'us per impact':>14}")
+    print(f"{'':60}{'us per impact':>14}{'phase error':>13}{'velocity error':>16}")
     for name, each in found.items():
-        print(f"{name:60}{each:14.3f}")
+        print(f"{name:60}{each:14.3f}" + "".join(f"{error:14.1e}" for error in off.get(name, ())))
     print(
         f"{options.repetitions} runs in turns: lanes with {best} are {ratio:,.0f} times faster than solve_ivp RK45 at "
         f"rtol 1e-6 on P(1,1), and exact to {phase:.0e} rad and {velocity:.0e}."
@@ -154,7 +197,7 @@ def main() -> int:
     if options.output is not None:
         options.output.mkdir(parents=True, exist_ok=True)
         result = {"machine": host, "instructions": best, "ratio": ratio, "microseconds_per_impact": found}
-        result |= {"phase_error": phase, "velocity_error": velocity}
+        result |= {"phase_error": phase, "velocity_error": velocity, "errors_of_others": off}
         (options.output / "bench_lanes.json").write_text(
             json.dumps(result, indent=2) + "\n", encoding="utf-8"
         )
