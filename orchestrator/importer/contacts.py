@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.contact_bond import (
+from vibroimpact.orchestrator.importer.pairs.pair import Pair, Pairs
+from vibroimpact.orchestrator.importer.pairs.rigid_stops import RigidStop
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import (
     DAMPING,
     FORCE,
     PORT_OUTPUTS,
     STIFFNESS,
     ContactBond,
 )
-from vibroimpact.orchestrator.importer.force_input import ForceInput
-from vibroimpact.orchestrator.importer.held_force import HeldForceBond
-from vibroimpact.orchestrator.importer.pairs import Pair, Pairs
-from vibroimpact.orchestrator.importer.rigid_stops import RigidStop
-from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
+from vibroimpact.orchestrator.importer.stop_contacts.held_force import HeldForceBond
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
 #: Steps in a contact, where the importer is told nothing else.

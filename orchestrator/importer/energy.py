@@ -19,12 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.importer.component import description_of
-from vibroimpact.orchestrator.importer.contact_bond import ContactBond
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
-from vibroimpact.orchestrator.importer.plain_contacts import ForceThatBegins, PlainContact, plain_contact
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, StopContactSpec
-from vibroimpact.orchestrator.importer.step_path import POINTS, WEIGHTS
+from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import ContactBond
+from vibroimpact.orchestrator.importer.stop_contacts.plain_contacts import (
+    ForceThatBegins,
+    PlainContact,
+    plain_contact,
+)
+from vibroimpact.orchestrator.importer.stop_contacts.step_path import POINTS, WEIGHTS
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: Inputs that are forces, by the last part of their name, with the displacement that they do work on.

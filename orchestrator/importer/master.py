@@ -10,7 +10,6 @@ from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.beginning import settle_connections
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, Value
-from vibroimpact.orchestrator.importer.contact_bond import MOST_REPETITIONS
 from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS, ContactBonds
 from vibroimpact.orchestrator.importer.events import (
     NO_EVENTS,
@@ -32,6 +31,7 @@ from vibroimpact.orchestrator.importer.specification import (
     StopContactSpec,
 )
 from vibroimpact.orchestrator.importer.step_plan import Parts, StepPlan
+from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import MOST_REPETITIONS
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
 from vibroimpact.orchestrator.importer.wiring import LoopSolver, SettlingInputs, order_of, transfers_of
 

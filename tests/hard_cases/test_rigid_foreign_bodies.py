@@ -296,7 +296,7 @@ def test_a_body_that_no_force_brings_to_its_velocity_is_an_error_that_says_where
 ) -> None:
     fmu = fmu_factory.mass(tmp_path, "3.0")
     importer = run_of([part("a", fmu, v=1.0), part("b", fmu)], PairSpec(point("a"), point("b"), 0.5))
-    monkeypatch.setattr("vibroimpact.orchestrator.importer.pulse.MISFIT", -1.0)
+    monkeypatch.setattr("vibroimpact.orchestrator.importer.stop_contacts.pulse.MISFIT", -1.0)
     with pytest.raises(
         ComponentError, match=r"[ab]\.f: expected a change of the velocity by .* after 8 tries at time 0\.5"
     ):

@@ -20,9 +20,7 @@ import numpy as np
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.force_input import ForceInput
-from vibroimpact.orchestrator.importer.meeting import MeetingSearch
-from vibroimpact.orchestrator.importer.pair_ends import (
+from vibroimpact.orchestrator.importer.pairs.ends import (
     BodyRate,
     Motion,
     PairEnd,
@@ -31,9 +29,11 @@ from vibroimpact.orchestrator.importer.pair_ends import (
     end_of,
     precision_at,
 )
-from vibroimpact.orchestrator.importer.pair_force import PairForce
-from vibroimpact.orchestrator.importer.pulse import Pulses
+from vibroimpact.orchestrator.importer.pairs.force import PairForce
+from vibroimpact.orchestrator.importer.pairs.meeting import MeetingSearch
 from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
+from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
 #: Likewise of bodies that rest on each other, whose force makes up for less.
 HIT_AT_REST = 1e-4

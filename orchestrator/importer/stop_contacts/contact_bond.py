@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from ctypes import c_void_p
 from dataclasses import dataclass
 
-from vibroimpact.orchestrator.importer.asked_stop import DEEPER, LOWER_SIDE, depth_that_stops
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import DEEPER, LOWER_SIDE, depth_that_stops
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
 #: The law by which a body follows the force of another FMU; the number of `contact[k].law`.

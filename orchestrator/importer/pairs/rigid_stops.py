@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.force_input import ForceInput
-from vibroimpact.orchestrator.importer.held_force import HeldForceBond
-from vibroimpact.orchestrator.importer.pair_ends import Motion, PointEnd, SurfaceEnd
-from vibroimpact.orchestrator.importer.pairs import Pair, Pairs
-from vibroimpact.orchestrator.importer.pulse import UNKNOWN_MASS, Pulse
+from vibroimpact.orchestrator.importer.pairs.ends import Motion, PointEnd, SurfaceEnd
+from vibroimpact.orchestrator.importer.pairs.pair import Pair, Pairs
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
+from vibroimpact.orchestrator.importer.stop_contacts.held_force import HeldForceBond
+from vibroimpact.orchestrator.importer.stop_contacts.pulse import UNKNOWN_MASS, Pulse
 
 
 class RigidStop(Pair):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from vibroimpact.orchestrator.importer.pair_ends import Motion, Scale
+from vibroimpact.orchestrator.importer.pairs.ends import Motion, Scale
 from vibroimpact.orchestrator.importer.revision import Bracket, refine
-from vibroimpact.orchestrator.importer.step_path import StepPath
+from vibroimpact.orchestrator.importer.stop_contacts.step_path import StepPath
 
 #: Halvings of a step in search of a contact.
 MOST_HALVINGS = 40

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 
-from vibroimpact.orchestrator.importer.asked_stop import AskedStop, ContactWork
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
-from vibroimpact.orchestrator.importer.step_path import StepPath
+from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import AskedStop, ContactWork
+from vibroimpact.orchestrator.importer.stop_contacts.step_path import StepPath
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: What an ImpactStop has beside the force; other components with a force need not be stops.

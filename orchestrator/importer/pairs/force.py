@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from vibroimpact.orchestrator.importer.specification import PairSpec
-from vibroimpact.orchestrator.importer.step_path import NODES, StepPath
+from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath
 
 #: A force this close to the one that the step asks for, relative to the largest of the contact, is the one.
 FORCE_TOLERANCE = 1e-12

@@ -20,13 +20,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.importer.asked_stop import AskedStop, ContactWork, depth_that_stops
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.force_input import TRIAL_STEP, ForceInput, TrialSteps
-from vibroimpact.orchestrator.importer.pulse import PART
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
-from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
+from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import (
+    AskedStop,
+    ContactWork,
+    depth_that_stops,
+)
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import TRIAL_STEP, ForceInput, TrialSteps
+from vibroimpact.orchestrator.importer.stop_contacts.pulse import PART
+from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
 
 #: A body on the surface is there within this times its displacement and the surface's.
 SURFACE_ROUNDING = 4.0 * np.finfo(float).eps

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
-from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
+from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
 
 LOWER_SIDE = 2
 #: The number of ImpactStop's law that answers a coefficient of restitution, and no force.

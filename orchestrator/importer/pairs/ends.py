@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
-from vibroimpact.orchestrator.importer.asked_stop import LOWER_SIDE
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.force_input import ForceInput, TrialSteps
-from vibroimpact.orchestrator.importer.pulse import Pulses
 from vibroimpact.orchestrator.importer.revision import PRECISION
 from vibroimpact.orchestrator.importer.specification import BodyPoint
+from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import LOWER_SIDE
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput, TrialSteps
+from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
 #: Touching pairs are nearer than what the fastest body moves in this many times the precision of an impact ...
 TOUCHING_TIMES = 64.0

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.force_input import ForceInput, TrialSteps, agrees
 from vibroimpact.orchestrator.importer.specification import BodyPoint
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput, TrialSteps, agrees
 
 #: Shortest pulse, s, and in units in the last place of the time; powers of 2, so that it ends at a number.
 SHORTEST, SHORTEST_ULPS = 2.0**-39, 64.0
