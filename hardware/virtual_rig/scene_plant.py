@@ -10,7 +10,7 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
 from vibroimpact.hardware.virtual_rig.playback import Playback
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
-from vibroimpact.orchestrator.run.measuring import MeasuredSession
+from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.scene.measuring_models import DRIVE
 from vibroimpact.orchestrator.scene.models import MOST_IMPACTS_PER_POINT

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, BranchPoint, dataset_of, run_point
 from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many import loop_of
+from vibroimpact.orchestrator.run.many_points.loop import loop_of
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
@@ -174,7 +174,7 @@ def _tried(scene: Scene) -> Trial:
 def _lane_seconds(scene: Scene, count: int) -> float:
     """Return what one of so many points, spread over the sweep, takes when they run in lanes, s."""
     # what finds points their lanes takes time to load, and only these scenes need it
-    from vibroimpact.orchestrator.run.lanes_rows import LaneValues, run_in_lanes
+    from vibroimpact.orchestrator.run.many_points.lanes_rows import LaneValues, run_in_lanes
 
     share = np.arange(count)
     values: dict[str, NDArray[np.float64]] = {}

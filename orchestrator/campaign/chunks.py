@@ -26,8 +26,8 @@ from vibroimpact.fmus.errors import CampaignError, VibroimpactError
 from vibroimpact.orchestrator.run import AnnouncedRunner, Runner, RunnerIdentity, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
-from vibroimpact.orchestrator.run.many import PointLoop, PointValues, loop_of
-from vibroimpact.orchestrator.run.many_rows import run_loop
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, loop_of
+from vibroimpact.orchestrator.run.many_points.loop_rows import run_loop
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
 
@@ -208,7 +208,7 @@ def _run_in_lanes(
     scene: Scene, runner: Runner, loop: PointLoop, points: PointColumns, start: State | None, deadline: float
 ) -> tuple[RunColumns, State | None]:
     # what finds points their lanes takes time to load, and only these scenes need it
-    from vibroimpact.orchestrator.run.lanes_rows import LaneValues, run_in_lanes
+    from vibroimpact.orchestrator.run.many_points.lanes_rows import LaneValues, run_in_lanes
 
     begins = np.isin(points.index, list(points.starts)) & points.first
     starts = {int(place): points.starts[int(points.index[place])] for place in np.flatnonzero(begins)}

@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.provenance import provenance
 from vibroimpact.orchestrator.run import Runner, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
-from vibroimpact.orchestrator.run.many import PointLoop, loop_of
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, loop_of
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, most_points, run_count

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.run.modal import mass_of_beam, modes_of_chain, row_of, structure_of
+from vibroimpact.orchestrator.run.many_points.modal import mass_of_beam, modes_of_chain, row_of, structure_of
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody

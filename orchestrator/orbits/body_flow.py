@@ -17,9 +17,9 @@ from vibroimpact.analysis.orbits.basins import Ends, Floats
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
-from vibroimpact.orchestrator.run.lanes_rows import run_prepared_in_lanes
-from vibroimpact.orchestrator.run.many import PointLoop, PointValues, PreparedPoints, loop_of
-from vibroimpact.orchestrator.run.many_rows import run_loop
+from vibroimpact.orchestrator.run.many_points.lanes_rows import run_prepared_in_lanes
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints, loop_of
+from vibroimpact.orchestrator.run.many_points.loop_rows import run_loop
 from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene

@@ -22,8 +22,8 @@ from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
-from vibroimpact.orchestrator.run.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.run.empty_record import sample_variables
+from vibroimpact.orchestrator.run.measuring.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name

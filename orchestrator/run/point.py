@@ -45,7 +45,7 @@ from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 from vibroimpact.orchestrator.scene.models import Record
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.run.measured_run import MeasuredRun
+    from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
 ENGINE = 3
 """Version of what follows our bodies, in C; with another one results differ, and no campaign mixes two."""
@@ -69,7 +69,7 @@ class PointRunner:
     Attributes
     ----------
     execution : str
-        What runs: `fused`, `coupled`, or `lanes`, which run many points at once (`lanes_rows`); a single one is fused.
+        What runs: `fused`, `coupled`, or `lanes`, which run many points at once (`many_points`); a single one is fused.
     engine : int
         Version of what follows the body.
     instruction_set : str
@@ -249,7 +249,7 @@ class _Run:
 
     def _go_measured(self) -> None:
         # only a scene with a measuring chain needs what follows it
-        from vibroimpact.orchestrator.run.measured_run import MeasuredRun
+        from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
         assert isinstance(self.driver, BodyDriver)  # the rules of scenes see to it
         window = self.begin_time, self.end_time

@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
     run_columns,
 )
 from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many import loop_of
+from vibroimpact.orchestrator.run.many_points.loop import loop_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 

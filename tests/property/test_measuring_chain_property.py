@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibroimpact.analysis.dataset import Direction
-from vibroimpact.orchestrator.run.conversion import converted, run_seed
-from vibroimpact.orchestrator.run.measuring import MeasuredSession
-from vibroimpact.orchestrator.run.measuring_chain import Floats
+from vibroimpact.orchestrator.run.measuring.chain import Floats
+from vibroimpact.orchestrator.run.measuring.conversion import converted, run_seed
+from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 BODY = (

@@ -21,8 +21,8 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard.guarded import make_runner
-from vibroimpact.orchestrator.run import lanes_rows
-from vibroimpact.orchestrator.run.many import PointLoop
+from vibroimpact.orchestrator.run.many_points import lanes_rows
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 

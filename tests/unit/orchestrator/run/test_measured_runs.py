@@ -15,7 +15,7 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord, open_dataset
 from vibroimpact.analysis.recording import Quality, open_signals
 from vibroimpact.orchestrator.campaign import run_campaign, run_scene
 from vibroimpact.orchestrator.run import PointRunner, Session
-from vibroimpact.orchestrator.run.measuring import MeasuredSession
+from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 BODY = """\

@@ -11,8 +11,8 @@ from support.tolerance import PARTITION
 from vibroimpact.fmus.core.measuring import LoadCell
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.orchestrator.run import Session
-from vibroimpact.orchestrator.run.measuring import MeasuredSession
-from vibroimpact.orchestrator.run.measuring_chain import Floats
+from vibroimpact.orchestrator.run.measuring.chain import Floats
+from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 BODY = "[body]\nmass = 2\nstiffness = 800\ndamping = 1.6\n[record]\nrecorded_time = 1\n"

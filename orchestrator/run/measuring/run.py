@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.run.fused import BodyDriver
-from vibroimpact.orchestrator.run.measuring_chain import MeasuringChain, held_exciter
+from vibroimpact.orchestrator.run.measuring.chain import MeasuringChain, held_exciter
 from vibroimpact.orchestrator.run.record import ROW_IMPACT, Rows, RunEnded, in_time_order
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene

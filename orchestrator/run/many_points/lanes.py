@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.core import lanes as core
-from vibroimpact.orchestrator.run.many import PreparedPoints
-from vibroimpact.orchestrator.run.modal import ModalPoints, modal_points
+from vibroimpact.orchestrator.run.many_points.loop import PreparedPoints
+from vibroimpact.orchestrator.run.many_points.modal import ModalPoints, modal_points
 from vibroimpact.orchestrator.run.parameters import integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 

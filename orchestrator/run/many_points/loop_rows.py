@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS, STICK_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
 from vibroimpact.fmus.core import runs as core
-from vibroimpact.orchestrator.run.many import PointLoop, PreparedPoints
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PreparedPoints
 from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.run.point import TWO_PI, late_message, limit_message
 from vibroimpact.orchestrator.run.record import (

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.core.measuring import LoadCell, exciter_force
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.fused import BodyDriver
-from vibroimpact.orchestrator.run.measuring_chain import NO_IMPACTS, Floats, MeasuringChain, held_exciter
+from vibroimpact.orchestrator.run.measuring.chain import NO_IMPACTS, Floats, MeasuringChain, held_exciter
+from vibroimpact.orchestrator.run.measuring.steps import Counts, cut, pieces_of
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.point import driver_of
 from vibroimpact.orchestrator.run.record import ROW_IMPACT, in_time_order
-from vibroimpact.orchestrator.run.steps import Counts, cut, pieces_of
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.measuring_models import DRIVE, LOAD_CELL, MEASURED_SENSOR
 

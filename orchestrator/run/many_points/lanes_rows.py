@@ -13,9 +13,9 @@ from vibroimpact.analysis.dataset import IMPACT_COLUMNS, STICK_COLUMNS, Outcome,
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.core.runs import address
-from vibroimpact.orchestrator.run.lanes import lane_points
-from vibroimpact.orchestrator.run.many import PointLoop, PointValues, PreparedPoints
-from vibroimpact.orchestrator.run.many_rows import (
+from vibroimpact.orchestrator.run.many_points.lanes import lane_points
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints
+from vibroimpact.orchestrator.run.many_points.loop_rows import (
     LISTEN_SECONDS,
     final_phases,
     period_table,
