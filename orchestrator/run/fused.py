@@ -128,10 +128,14 @@ class BodyDriver(RecordedBody):
             else:
                 instance.time = end
 
+    def advance_sampling(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Advance from one instant to the next by one call; return the sampled variables at each."""
+        return self.hold(times, None, self._sampled_names, recording=True)
+
     def hold(
         self,
         ends: NDArray[np.float64],
-        forces: NDArray[np.float64],
+        forces: NDArray[np.float64] | None,
         outputs: Sequence[str],
         *,
         renewed: NDArray[np.uint8] | None = None,
@@ -144,8 +148,8 @@ class BodyDriver(RecordedBody):
         ----------
         ends : ndarray, shape (sample,)
             s, ascending, after the time reached.
-        forces : ndarray, shape (sample,)
-            N, each held until the sample at its place; V of an exciter.
+        forces : ndarray, shape (sample,), or None
+            N, each held until the sample at its place; V of an exciter. None: the force stays as it is.
         outputs : sequence of str
             Variables of the body that are read at each sample.
         renewed : ndarray of uint8, shape (sample,), optional
@@ -171,6 +175,8 @@ class BodyDriver(RecordedBody):
         elif self._held != tuple(outputs):
             self.record(impacts=False, extrema=False, periods=False)
             self._held = tuple(outputs)
+        if forces is None:
+            forces, renewed = np.zeros(len(ends)), np.zeros(len(ends), dtype=np.uint8)
         read = np.array([self.references[name] for name in outputs], dtype=np.uint32)
         plan = self._hold_plan(read, exciter, recording=recording)
         samples = np.empty((len(ends), len(outputs)))
@@ -211,8 +217,9 @@ class BodyDriver(RecordedBody):
     ) -> stepping.HoldPlan:
         references = self.references
         plan = stepping.HoldPlan(
-            force=references["force"],
-            force_rate=references["force_rate"],
+            # a chain has inputs of its own, which nobody sets here
+            force=references.get("force", 0),
+            force_rate=references.get("force_rate", 0),
             outputs=runs.RunsVariables(runs.address(read), len(read)),
         )
         if exciter is not None:

@@ -158,7 +158,7 @@ class RecordedBody(ABC):
         ports = [f"contact[{k}]" for k in range(1, contacts + 1)]
         self._stuck = self._some("Boolean", [f"{port}.stuck" for port in ports])
         self._stick_starts = self._some("Float64", [f"{port}.stick_start" for port in ports])
-        self._sampled = self._some("Float64", sampled)
+        self._sampled, self._sampled_names = self._some("Float64", sampled), tuple(sampled)
         self._state = self._some("Float64", state)
         self._energies = self._some("Boolean", ["record.energies"] if energies else [])
         self._slowest = self._some("Float64", ["natural_angular_frequency[1]"] if slowest else [])
@@ -231,6 +231,33 @@ class RecordedBody(ABC):
         """Return displacement (m) and velocity (m/s) of the observed point."""
         displacement, velocity = self._observed.get()
         return float(displacement), float(velocity)
+
+    def advance_sampling(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Advance from one instant to the next, as `advance`; return the sampled variables at each.
+
+        Parameters
+        ----------
+        times : ndarray, shape (instant,)
+            s, ascending; the first is not before the time reached.
+
+        Returns
+        -------
+        ndarray, shape (instant, variable)
+
+        Raises
+        ------
+        ImpactLimitReached, DeadlineReached
+            The run ends before; they have the samples so far.
+        """
+        rows: list[NDArray[np.float64]] = []
+        try:
+            for end in times.tolist():
+                self.advance(end)
+                rows.append(self.sampled().copy())
+        except RunEnded as reached:
+            reached.samples = np.array(rows)
+            raise
+        return np.array(rows)
 
     def sampled(self) -> NDArray[np.float64]:
         """Return the present values of the sampled variables; the buffer is used again at the next call."""

@@ -97,8 +97,7 @@ class TimeSeriesPlan:
         """Return what is added to an acceleration of the body's FMU at instants, m/s^2, shape (instant,)."""
         if forcing is None or not self._is_relative(forcing):
             return np.zeros(len(times))
-        angle = forcing.angular_frequency * times + parameters["forcing.phase"]
-        return np.asarray(forcing.scalar_amplitude * np.cos(angle), dtype=np.float64)
+        return forcing.scalar_amplitude * _cosines(forcing, parameters, times)
 
     def rows(
         self,
@@ -108,7 +107,7 @@ class TimeSeriesPlan:
         parameters: Mapping[str, float],
         times: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return the sampled variables at many instants, those of `names`: as `row`, to rounding.
+        """Return the sampled variables at many instants, those of `names`: as `row`.
 
         Parameters
         ----------
@@ -129,13 +128,27 @@ class TimeSeriesPlan:
         base = self.base(forcing, parameters, times)
         for column, (name, parts) in enumerate(zip(self.names, self._columns, strict=True)):
             if name.startswith("forcing") and forcing is not None:
-                angle = forcing.angular_frequency * times + parameters["forcing.phase"]
-                found[:, column] = _amplitude(forcing, name) * np.cos(angle)
+                found[:, column] = _amplitude(forcing, name) * _cosines(forcing, parameters, times)
                 continue
-            found[:, column] = values[:, [own[part] for part in parts]].sum(axis=1)
+            found[:, column] = _sums(values[:, [own[part] for part in parts]])
             if name.startswith("acceleration"):
                 found[:, column] += base
         return found
+
+
+def _cosines(
+    forcing: Forcing, parameters: Mapping[str, float], times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the cosine of the forcing phase at instants: one by one, as the last bits of numpy's are the machine's."""
+    angles = forcing.angular_frequency * times + parameters["forcing.phase"]
+    return np.array([math.cos(angle) for angle in angles.tolist()])
+
+
+def _sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum of each row, rounded once."""
+    if values.shape[1] == 1:
+        return values[:, 0]
+    return np.array([math.fsum(row) for row in values.tolist()])
 
 
 def _amplitude(forcing: Forcing | None, name: str) -> float:
