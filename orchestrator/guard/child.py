@@ -17,6 +17,7 @@ from vibroimpact.orchestrator.guard.pipe import (
     BATCH_TIME,
     BELL,
     Failure,
+    Memory,
     Order,
     PointTask,
     packed,
@@ -54,6 +55,7 @@ class _Answers:
     def __init__(self, pipe: int, bell: int | None) -> None:
         self._pipe, self._bell = pipe, bell
         self._unread = 0
+        self.memory = Memory(None)
         if bell is not None:
             os.set_inheritable(bell, False)
             os.set_blocking(pipe, False)
@@ -61,7 +63,7 @@ class _Answers:
     def put(self, message: Any, *, last: bool = True) -> None:
         """Answer; `last`: nothing more comes of what was to be run."""
         self._unread += 1
-        left = packed(message)
+        left = packed(message, self.memory)
         with contextlib.suppress(BlockingIOError):
             left = self._written(left)
         if last or left:
@@ -109,6 +111,7 @@ def _answer(runner: Runner, point: PointTask) -> Any:
 
 def _serve(runner: Runner, batch: tuple[PointTask, ...], notes: Breadcrumbs, answers: _Answers) -> None:
     """Run points, until all are done or their time is over."""
+    answers.memory.clear()
     end = time.monotonic() + BATCH_TIME
     for left, point in zip(reversed(range(len(batch))), batch, strict=True):
         notes.begin()
@@ -133,6 +136,9 @@ def main(bell: int | None) -> None:
     order = receive(orders)
     if not isinstance(order, Order):
         return
+    if order.memory is not None:
+        os.set_inheritable(order.memory, False)
+        answers.memory = Memory(order.memory)
     notes = Breadcrumbs(Path(order.notes))
     _look_around(parent, notes)
     try:

@@ -1,15 +1,18 @@
 """What a guard and its child say to each other: messages with their length in front.
 
 Both ends are this package in processes of one user; nothing else can write to these pipes. Messages are pickled,
-but for records, of which there is one for each point: their arrays come after them as they lie in memory.
+but for records, of which there is one for each point: their arrays come after them as they lie in memory, or, where
+they are large and the system has files in memory, in such a file, whose pages are there already: a pipe finds new ones
+for all that crosses it. The child writes the file and does not map it: like the pipe it is out of an FMU's reach.
 """
 
 from __future__ import annotations
 
 import marshal
+import os
 import pickle
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import IO, Any
@@ -20,8 +23,12 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.scene import Scene
 
-#: Stands before each message: its length, without the arrays of a record, and whether it is one.
-HEAD = struct.Struct("<Q?")
+#: Stands before each message: its length, without the arrays of a record, and where those are: a place in the memory
+#: that both share, or one of the two below.
+HEAD = struct.Struct("<Qq")
+NO_RECORD, FOLLOWING = -1, -2
+#: Arrays of a record that are smaller go through the pipe; those of a batch share so much memory, bytes.
+LARGE, MEMORY_ROOM = 1 << 14, 1 << 24
 #: What a child says on its bell: how many answers there are to read, and whether they end what it was given to run.
 BELL = struct.Struct("<B?")
 #: Points that a child is given at a time, at most: their number is one byte on the bell.
@@ -35,12 +42,16 @@ PointTask = tuple[Mapping[str, float], tuple[float, ...] | None]
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What the child shall run: a scene, its execution, the file of notes, and whether to note every call there."""
+    """What the child shall run: a scene, its execution, the file of notes, and whether to note every call there.
+
+    `memory`: the descriptor of the file in memory for arrays; None: there is none.
+    """
 
     scene: Scene
     execution: str
     notes: str
     noting: bool
+    memory: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,30 +71,62 @@ _ARRAYS = ("periods", "impacts", "sticks", "samples", "events", "energy_residual
 _arrays_of = attrgetter(*_ARRAYS)
 
 
-def _packed_record(record: RunRecord) -> list[memoryview]:
+class Memory:
+    """The file in memory that a child writes arrays of records to, one after the other until a batch has been read."""
+
+    def __init__(self, file: int | None) -> None:
+        self._file, self._used = file, 0
+
+    def clear(self) -> None:
+        """Begin again at its start: all that is in it has been read."""
+        self._used = 0
+
+    def place(self, arrays: Sequence[memoryview]) -> int | None:
+        """Write arrays and return where they are; None where they are to go through the pipe."""
+        size = sum(len(array) for array in arrays)
+        if self._file is None or size < LARGE or self._used + size > MEMORY_ROOM:
+            return None
+        try:
+            if os.pwritev(self._file, arrays, self._used) < size:
+                return None
+        except OSError:  # the system has no memory left for it; the pipe needs none
+            return None
+        place, self._used = self._used, self._used + size
+        return place
+
+
+def _packed_record(record: RunRecord, memory: Memory | None) -> list[memoryview]:
     """Return what a record is sent as: its head with its numbers and what else there is, then its arrays of float64."""
     arrays = [None if array is None else np.ascontiguousarray(array) for array in _arrays_of(record)]
     shapes = [None if array is None else array.shape for array in arrays]
     numbers = _NUMBERS.pack(*_numbers_of(record))
     residual = None if record.loop_residual is None else float(record.loop_residual)
     data = marshal.dumps((numbers, record.message, residual, shapes))
-    head = memoryview(HEAD.pack(len(data), True) + data)
-    return [head, *(_bytes_of(array) for array in arrays if array is not None and array.size)]
+    rows = [_bytes_of(array) for array in arrays if array is not None and array.size]
+    place = None if memory is None else memory.place(rows)
+    head = memoryview(HEAD.pack(len(data), FOLLOWING if place is None else place) + data)
+    return [head, *rows] if place is None else [head]
 
 
 def _bytes_of(array: NDArray[np.float64]) -> memoryview:
     return array.reshape(-1).view(np.uint8).data
 
 
-def _received_record(data: bytes, pipe: IO[bytes]) -> RunRecord | None:
-    """Return the record that begins with `data`, its arrays read from the pipe; None where they are not whole."""
+def _received_record(data: bytes, place: int, pipe: IO[bytes], memory: int | None) -> RunRecord | None:
+    """Return the record that begins with `data`, its arrays read from where they are; None where they are not whole."""
     numbers, message, residual, shapes = marshal.loads(data)
     outcome, displacement, velocity, phase, seconds = _NUMBERS.unpack(numbers)
-    arrays: dict[str, NDArray[np.float64] | None] = {}
-    for name, shape in zip(_ARRAYS, shapes, strict=True):
-        arrays[name] = array = None if shape is None else np.empty(shape)
-        if array is not None and array.size and _read_into(pipe, array) < array.nbytes:
-            return None
+    arrays = {
+        name: None if shape is None else np.empty(shape) for name, shape in zip(_ARRAYS, shapes, strict=True)
+    }
+    rows = [_bytes_of(array) for array in arrays.values() if array is not None and array.size]
+    if place == FOLLOWING:
+        are_whole = all(pipe.readinto(row) == len(row) for row in rows)  # type: ignore[attr-defined]  # of all pipes, not of all IO
+    else:
+        assert memory is not None  # the child has it from here
+        are_whole = os.preadv(memory, rows, place) == sum(map(len, rows))
+    if not are_whole:
+        return None
     return RunRecord(
         Outcome(outcome),
         message,
@@ -96,17 +139,15 @@ def _received_record(data: bytes, pipe: IO[bytes]) -> RunRecord | None:
     )
 
 
-def _read_into(pipe: IO[bytes], array: NDArray[np.float64]) -> int:
-    """Fill an array from a pipe; return how many bytes there were."""
-    return pipe.readinto(_bytes_of(array)) or 0  # type: ignore[attr-defined]  # of all pipes, not of all IO
+def packed(message: Any, memory: Memory | None = None) -> list[memoryview]:
+    """Return the bytes of a message, in rows: of a record, an object of this module, or a tuple of points.
 
-
-def packed(message: Any) -> list[memoryview]:
-    """Return the bytes of a message, in rows: of a record, an object of this module, or a tuple of points."""
+    `memory`: where large arrays are put; None: with the rest.
+    """
     if isinstance(message, RunRecord):
-        return _packed_record(message)
+        return _packed_record(message, memory)
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    return [memoryview(HEAD.pack(len(data), False) + data)]
+    return [memoryview(HEAD.pack(len(data), NO_RECORD) + data)]
 
 
 def send(pipe: IO[bytes], message: Any) -> None:
@@ -115,13 +156,16 @@ def send(pipe: IO[bytes], message: Any) -> None:
     pipe.flush()
 
 
-def receive(pipe: IO[bytes]) -> Any:
-    """Read one message; None when the other end is gone, or, of a pipe that does not block, where none is whole."""
+def receive(pipe: IO[bytes], memory: int | None = None) -> Any:
+    """Read one message; None when the other end is gone, or, of a pipe that does not block, where none is whole.
+
+    `memory`: the descriptor of the file in memory that the other end has.
+    """
     head = pipe.read(HEAD.size) or b""
     if len(head) < HEAD.size:
         return None
-    size, is_record = HEAD.unpack(head)
+    size, place = HEAD.unpack(head)
     data = pipe.read(size) or b""
     if len(data) < size:
         return None
-    return _received_record(data, pipe) if is_record else pickle.loads(data)
+    return pickle.loads(data) if place == NO_RECORD else _received_record(data, place, pipe, memory)

@@ -9,6 +9,7 @@ import select
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from functools import partial
 from typing import IO, Any
 
@@ -37,13 +38,15 @@ class PointProcess:
 
     def __init__(self, order: Order) -> None:
         self._bell, bell = os.pipe() if HAS_BELL else (-1, -1)
+        self._memory = os.memfd_create("records") if sys.platform == "linux" else None
+        passed = [each for each in (bell, self._memory) if each is not None] if HAS_BELL else []
         self._process = subprocess.Popen(
             python_command("-m", "vibroimpact.orchestrator.guard.supervisor", str(bell)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C reaches all processes of a terminal's session: it is the parent's
-            pass_fds=(bell,) if HAS_BELL else (),
+            pass_fds=passed,
         )
         assert self._process.stdout is not None
         _enlarge(self._process.stdout)
@@ -56,7 +59,7 @@ class PointProcess:
         else:
             self._reader = threading.Thread(target=self._read, daemon=True)
             self._reader.start()
-        self.say(order)
+        self.say(replace(order, memory=self._memory))
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -94,7 +97,7 @@ class PointProcess:
             return [None], True
         count, last = BELL.unpack(rung)
         assert self._process.stdout is not None
-        answers = [receive(self._process.stdout) for _ in range(count)]
+        answers = [receive(self._process.stdout, self._memory) for _ in range(count)]
         return answers, last or answers[-1] is None
 
     def end(self, *, at_once: bool = False) -> tuple[int, list[Any]]:
@@ -117,6 +120,8 @@ class PointProcess:
             code = self._process.wait()
         answers = self._unread()
         self._close(self._process.stdout)
+        if self._memory is not None:
+            os.close(self._memory)
         return code, answers
 
     def _unread(self) -> list[Any]:
@@ -128,7 +133,7 @@ class PointProcess:
         assert pipe is not None
         # a process that an FMU has started may hold the pipe open
         os.set_blocking(pipe.fileno(), False)
-        return list(iter(partial(receive, pipe), None))
+        return list(iter(partial(receive, pipe, self._memory), None))
 
     @staticmethod
     def _close(pipe: IO[bytes] | None) -> None:

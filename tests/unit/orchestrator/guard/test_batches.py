@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.guard import GuardedRunner, guarded, make_runner
 from vibroimpact.orchestrator.guard.pipe import PointTask
 from vibroimpact.orchestrator.guard.point_process import PointProcess
 from vibroimpact.orchestrator.run import open_runner
-from vibroimpact.orchestrator.scene import parse_scene
+from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import Point
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there points are run one by one")
@@ -29,26 +29,31 @@ parameters = { stiffness = 1.0, velocity_start = 1.0 }
 [record]
 recorded_time = 1.0
 variables = ["body.displacement", "body.velocity"]
-rate = 500
+rate = RATE
 [execution]
 macro_step = 1.0
 guard = true
 """
-"""The samples of a point are 12 kB: those of six are more than the pipe between two processes holds."""
 SWEPT = "body.stiffness"
 
 
+@pytest.fixture(scope="module", params=[500, 5000], ids=["pipe", "memory"])
+def scene(request: pytest.FixtureRequest) -> Scene:
+    """Return a scene whose points have 12 kB of samples, which go through the pipe, or 120 kB, which go by memory."""
+    return parse_scene(SCENE.replace("RATE", str(request.param)), "batches.toml")
+
+
 @pytest.fixture(scope="module")
-def runner() -> Iterator[GuardedRunner]:
-    made = make_runner(parse_scene(SCENE, "batches.toml"))
+def runner(scene: Scene) -> Iterator[GuardedRunner]:
+    made = make_runner(scene)
     assert isinstance(made, GuardedRunner)
     yield made
     made.close()
 
 
 @pytest.fixture(scope="module")
-def alone() -> Iterator[Callable[[float], RunRecord]]:
-    made = open_runner(parse_scene(SCENE, "batches.toml"), "auto")
+def alone(scene: Scene) -> Iterator[Callable[[float], RunRecord]]:
+    made = open_runner(scene, "auto")
     yield lambda stiffness: made.run({SWEPT: stiffness})
     made.close()
 
@@ -75,6 +80,7 @@ def assert_same(record: RunRecord, expected: RunRecord) -> None:
 
 
 def test_the_points_of_a_chunk_are_those_of_a_runner_without_a_guard(
+    scene: Scene,
     runner: GuardedRunner,
     alone: Callable[[float], RunRecord],
     batches: list[int],
@@ -87,7 +93,7 @@ def test_the_points_of_a_chunk_are_those_of_a_runner_without_a_guard(
         BranchPoint(Point(k, {SWEPT: stiffness}), Direction.independent, first=k == 0)
         for k, stiffness in enumerate(stiffnesses)
     ]
-    records, _ = run_points(parse_scene(SCENE, "batches.toml"), runner, points, None)
+    records, _ = run_points(scene, runner, points, None)
     for stiffness, record in zip(stiffnesses, records, strict=True):
         assert_same(record, alone(stiffness))
     assert 1 < len(batches) < len(points)

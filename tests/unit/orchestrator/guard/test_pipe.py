@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import io
 import os
+import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.orchestrator.guard import pipe as pipe_module
 from vibroimpact.orchestrator.guard.child import _Answers
-from vibroimpact.orchestrator.guard.pipe import BELL, HEAD, Failure, Order, receive, send
+from vibroimpact.orchestrator.guard.pipe import BELL, HEAD, Failure, Memory, Order, packed, receive, send
 from vibroimpact.orchestrator.guard.point_process import HAS_BELL
 from vibroimpact.orchestrator.scene import parse_scene
 
@@ -41,9 +44,10 @@ def test_a_message_that_was_cut_off_is_none(kept: int) -> None:
     assert receive(io.BytesIO(sent(Failure("lost"))[:kept])) is None
 
 
-def test_a_record_arrives_with_every_bit_of_its_arrays_which_may_be_written() -> None:
-    table = np.arange(12.0).reshape(3, 4)
-    sent_record = RunRecord(
+def record_of(rows: int) -> RunRecord:
+    """Return a record whose arrays are of all kinds."""
+    table = np.arange(4.0 * rows).reshape(rows, 4)
+    return RunRecord(
         Outcome.stuck,
         "stuck",
         periods=np.empty((0, 5)),
@@ -53,8 +57,10 @@ def test_a_record_arrives_with_every_bit_of_its_arrays_which_may_be_written() ->
         final_displacement=0.1 + 0.2,
         loop_residual=1e-300,
     )
-    record = receive(io.BytesIO(sent(sent_record)))
-    assert record.outcome is Outcome.stuck
+
+
+def assert_arrived(record: RunRecord, sent_record: RunRecord) -> None:
+    assert record.outcome is sent_record.outcome
     for name in RunRecord.__slots__:
         value, expected = getattr(record, name), getattr(sent_record, name)
         if isinstance(expected, np.ndarray):
@@ -63,6 +69,70 @@ def test_a_record_arrives_with_every_bit_of_its_arrays_which_may_be_written() ->
             assert value.flags.writeable
         else:
             np.testing.assert_equal(value, expected)
+
+
+def test_a_record_arrives_with_every_bit_of_its_arrays_which_may_be_written() -> None:
+    sent_record = record_of(3)
+    assert_arrived(receive(io.BytesIO(sent(sent_record))), sent_record)
+
+
+@pytest.fixture
+def memory() -> Iterator[int]:
+    """Return a file in memory."""
+    if sys.platform != "linux":
+        pytest.skip("the system has no files in memory")
+    file = os.memfd_create("test")
+    yield file
+    os.close(file)
+
+
+def through(memory: int, writer: Memory, *records: RunRecord) -> tuple[list[RunRecord | None], int]:
+    """Send records and receive them; also return how many bytes went through the pipe."""
+    pipe = io.BytesIO(b"".join(bytes(row) for record in records for row in packed(record, writer)))
+    size = len(pipe.getvalue())
+    return [receive(pipe, memory) for _ in records], size
+
+
+def test_large_arrays_arrive_by_memory_and_all_others_by_the_pipe(memory: int) -> None:
+    records = [record_of(rows) for rows in (3, 2000, 5, 3000)]
+    writer = Memory(memory)
+    for _ in range(3):  # the batches after the first find the memory as that has left it
+        received, size = through(memory, writer, *records)
+        assert size < 2000
+        for record, expected in zip(received, records, strict=True):
+            assert record is not None
+            assert_arrived(record, expected)
+        writer.clear()
+
+
+def test_what_memory_has_no_room_for_goes_through_the_pipe(
+    memory: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipe_module, "MEMORY_ROOM", 250_000)
+    records = [record_of(rows) for rows in (2000, 3000, 4000, 500)]
+    received, size = through(memory, Memory(memory), *records)
+    assert os.fstat(memory).st_size <= 250_000
+    assert size > 100_000
+    for record, expected in zip(received, records, strict=True):
+        assert record is not None
+        assert_arrived(record, expected)
+
+
+def test_a_file_that_takes_nothing_leaves_all_to_the_pipe(memory: int) -> None:
+    refusing = os.open(f"/proc/self/fd/{memory}", os.O_RDONLY)
+    try:
+        (record,), size = through(memory, Memory(refusing), record_of(2000))
+    finally:
+        os.close(refusing)
+    assert size > 90_000
+    assert record is not None
+    assert_arrived(record, record_of(2000))
+
+
+def test_a_record_whose_memory_is_gone_is_none(memory: int) -> None:
+    pipe = io.BytesIO(b"".join(bytes(row) for row in packed(record_of(2000), Memory(memory))))
+    os.ftruncate(memory, 1000)
+    assert receive(pipe, memory) is None
 
 
 @pytest.mark.parametrize("missing", [1, 7, 8, 96, 97, 200])
