@@ -15,6 +15,7 @@ else runs there is taken from one of the three at a time.
 from __future__ import annotations
 
 import argparse
+import math
 import multiprocessing
 import statistics
 import tempfile
@@ -24,8 +25,16 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, get_ready, points_of, run_chunk
+from vibroimpact.orchestrator.campaign.chunks import (
+    Chunk,
+    Work,
+    columns_of_points,
+    get_ready,
+    run_chunk,
+    run_columns,
+)
 from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run.many_points.loop import loop_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
@@ -92,10 +101,10 @@ def _bare_process(
 
 def _points_only(work: Work) -> Task:
     branches, runner = expand(work.scene), named_runner(work.scene, work.runner)
+    loop = loop_of(work.scene, runner)
 
     def run(chunk: Chunk) -> None:
-        for place in points_of(branches, chunk):
-            runner.run(place.point.values, None)
+        run_columns(work.scene, runner, loop, columns_of_points(branches, chunk), chunk.start, math.inf)
 
     return run
 
