@@ -108,7 +108,11 @@ def kinds() -> dict[str, Picture]:
         "resonances": _of(
             "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
         ),
-        "lyapunov": _of("lyapunov", "exponents", "vibroimpact lyapunov bifurcation.nc -o exponents.nc"),
+        "lyapunov": _of(
+            "lyapunov",
+            "exponents",
+            "vibroimpact lyapunov examples/bifurcation.toml --set record.recorded_periods=400 -o exponents.nc",
+        ),
         "maps": _of(
             "maps",
             "sets",
