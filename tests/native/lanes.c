@@ -2,17 +2,21 @@
  * time of a call, and branches that wait for the scalar engine. */
 #include "lanes/lanes.h"
 
+#include <float.h>
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
 #include "body/record.h"
 #include "check.h"
+#include "lanes/lane_turn.h"
 
 enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
 
 /* Arrays of some points, and what they come to. */
 typedef struct {
-    double stiffness[STATES], decay[STATES], force[STATES], held[STATES], observed[STATES], start_q[STATES], start_p[STATES];
+    double stiffness[STATES], decay[STATES], force[STATES], held[STATES], observed[STATES], start_q[STATES],
+        start_p[STATES];
     double angular_frequency[POINTS], phase[POINTS], begin[POINTS], end[POINTS];
     double shape[VI_LANES_CONTACTS * STATES], impulse[VI_LANES_CONTACTS * STATES];
     double position[VI_LANES_CONTACTS * POINTS], direction[VI_LANES_CONTACTS * POINTS];
@@ -29,11 +33,13 @@ typedef struct {
 } results;
 
 static const double TURN = 6.283185307179586;
+/* Of all results, on every processor and with every C library: where they change, so does ENGINE (orchestrator/run). */
+static const uint64_t BITS = 0x278ed239e40a0061u;
 
 static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed)
 {
     for (int j = 0; j < modes; ++j) {
-        const double natural = pow(10.0, uniform(seed, -0.3, 0.7)), ratio = choice(seed, 5) ? 0.03 : uniform(seed, 0.0, 3.0);
+        const double natural = uniform(seed, 0.5, 5.0), ratio = choice(seed, 5) ? 0.03 : uniform(seed, 0.0, 3.0);
         const int at = j * POINTS + i;
         s->stiffness[at] = natural * natural;
         s->decay[at] = ratio * natural;
@@ -64,8 +70,8 @@ static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed
 /* A number that no point can have, somewhere. */
 static void spoil(sample *s, int i, uint64_t *seed)
 {
-    double *const arrays[] = {s->stiffness, s->decay, s->force, s->held, s->start_q, s->start_p, s->angular_frequency,
-                              s->phase, s->begin, s->end, s->observed};
+    double *const arrays[] = {s->stiffness,         s->decay, s->force, s->held, s->start_q, s->start_p,
+                              s->angular_frequency, s->phase, s->begin, s->end,  s->observed};
     const double values[] = {NAN, INFINITY, -INFINITY};
     arrays[choice(seed, sizeof arrays / sizeof arrays[0])][i] = values[choice(seed, 3)];
 }
@@ -83,14 +89,37 @@ static void take_rows(vi_lanes_points *p, results *r)
 
 static vi_lanes_points points_of(const sample *s, results *r, double *rows, int64_t *owner, double seconds)
 {
-    return (vi_lanes_points){
-        .count = POINTS, .stiffness = s->stiffness, .decay = s->decay, .force = s->force, .held = s->held,
-        .angular_frequency = s->angular_frequency, .phase = s->phase, .shape = s->shape, .impulse = s->impulse,
-        .observed = s->observed, .position = s->position, .direction = s->direction, .restitution = s->restitution,
-        .yield_velocity = s->yield_velocity, .start_q = s->start_q, .start_p = s->start_p, .begin = s->begin,
-        .end = s->end, .first = s->first, .state = r->state, .outcome = r->outcome, .reached = r->reached,
-        .displacement = r->displacement, .velocity = r->velocity, .final_q = r->final_q, .final_p = r->final_p,
-        .rows_of = r->rows_of, .rows = rows, .owner = owner, .rows_room = ROOM, .most_seconds = seconds};
+    return (vi_lanes_points){.count = POINTS,
+                             .stiffness = s->stiffness,
+                             .decay = s->decay,
+                             .force = s->force,
+                             .held = s->held,
+                             .angular_frequency = s->angular_frequency,
+                             .phase = s->phase,
+                             .shape = s->shape,
+                             .impulse = s->impulse,
+                             .observed = s->observed,
+                             .position = s->position,
+                             .direction = s->direction,
+                             .restitution = s->restitution,
+                             .yield_velocity = s->yield_velocity,
+                             .start_q = s->start_q,
+                             .start_p = s->start_p,
+                             .begin = s->begin,
+                             .end = s->end,
+                             .first = s->first,
+                             .state = r->state,
+                             .outcome = r->outcome,
+                             .reached = r->reached,
+                             .displacement = r->displacement,
+                             .velocity = r->velocity,
+                             .final_q = r->final_q,
+                             .final_p = r->final_p,
+                             .rows_of = r->rows_of,
+                             .rows = rows,
+                             .owner = owner,
+                             .rows_room = ROOM,
+                             .most_seconds = seconds};
 }
 
 /* Answer the points that are left as a scalar engine would: they end where they began. */
@@ -132,12 +161,39 @@ static void compare(const results *a, const results *b, int i, const char *what)
     CHECK(a->state[i] == b->state[i], "one state of point %d by %s", i, what);
     if (a->state[i] == VI_POINT_HAS_RUN) {
         CHECK(memcmp(&a->final_q[i], &b->final_q[i], sizeof a->final_q[i]) == 0, "one end of point %d by %s", i, what);
-        CHECK(a->sum_of_rows[i] == b->sum_of_rows[i] && a->rows_of[i] == b->rows_of[i], "the rows of %d by %s", i, what);
+        CHECK(a->sum_of_rows[i] == b->sum_of_rows[i] && a->rows_of[i] == b->rows_of[i], "the rows of %d by %s", i,
+              what);
         CHECK(isfinite(a->displacement[i]) && isfinite(a->velocity[i]), "numbers at the end of point %d", i);
     }
 }
 
-static void check_sizes(int modes, int contacts, uint64_t *seed)
+static uint64_t hashed(uint64_t hash, const void *data, size_t size)
+{
+    const unsigned char *bytes = data;
+    for (size_t i = 0; i < size; ++i) {
+        hash = (hash ^ bytes[i]) * 1099511628211u; /* FNV-1a */
+    }
+    return hash;
+}
+
+/* All bits of what the points come to, after those of the sizes before. */
+static uint64_t hash_of(uint64_t hash, const results *r, int modes)
+{
+    for (int i = 0; i < POINTS; ++i) {
+        hash = hashed(hash, &r->state[i], sizeof r->state[i]);
+        if (r->state[i] != VI_POINT_HAS_RUN) {
+            continue;
+        }
+        hash = hashed(hash, &r->sum_of_rows[i], sizeof r->sum_of_rows[i]);
+        for (int j = 0; j < modes; ++j) {
+            hash = hashed(hash, &r->final_q[j * POINTS + i], sizeof(double));
+            hash = hashed(hash, &r->final_p[j * POINTS + i], sizeof(double));
+        }
+    }
+    return hash;
+}
+
+static void check_sizes(int modes, int contacts, uint64_t *seed, uint64_t *hash)
 {
     static sample good, bad;
     static results whole, other;
@@ -147,6 +203,7 @@ static void check_sizes(int modes, int contacts, uint64_t *seed)
         good.first[i] = choice(seed, 3) != 0;
     }
     run(&good, &whole, &plan, 1e9);
+    *hash = hash_of(*hash, &whole, modes);
     for (int set = VI_INSTRUCTIONS_BEST; set <= VI_INSTRUCTIONS_AVX512; ++set) {
         if (vi_door_lanes_instructions(set)) {
             plan.instructions = set;
@@ -175,18 +232,46 @@ static void check_sizes(int modes, int contacts, uint64_t *seed)
     CHECK(ran > POINTS / 3, "most points to run in lanes, got %d of %d modes", ran, modes);
 }
 
+/* The functions that the lanes have of their own, beside those of the C library. */
+static void check_functions(uint64_t *seed)
+{
+    for (int i = 0; i < 20000; ++i) {
+        const double x = choice(seed, 2) ? uniform(seed, 0.0, 100.0) : pow(10.0, uniform(seed, -12.0, 2.8));
+        double lost, cosine, sine;
+        const double left = vi_lane_decay(x, &lost);
+        CHECK(fabs(left - exp(-x)) <= 2.0 * DBL_EPSILON * exp(-x), "exp(-%.17g), got %.17g", x, left);
+        CHECK(fabs(lost + expm1(-x)) <= -4.0 * DBL_EPSILON * expm1(-x), "1 - exp(-%.17g), got %.17g", x, lost);
+        if (x <= 100.0) {
+            vi_lane_turn(x, &cosine, &sine);
+            CHECK(fabs(cosine - cos(x)) <= 2.0 * DBL_EPSILON * fabs(cos(x)) + 1e-22, "cos(%.17g), got %.17g", x,
+                  cosine);
+            CHECK(fabs(sine - sin(x)) <= 2.0 * DBL_EPSILON * fabs(sin(x)) + 1e-22, "sin(%.17g), got %.17g", x, sine);
+        }
+    }
+    const double beyond[] = {746.0, 1e300, INFINITY, NAN};
+    for (size_t i = 0; i < sizeof beyond / sizeof beyond[0]; ++i) {
+        double lost;
+        CHECK(vi_lane_decay(beyond[i], &lost) == 0.0 && lost == 1.0, "nothing left at %g", beyond[i]);
+    }
+}
+
 int main(void)
 {
-    uint64_t seed = 18;
-    const vi_lanes_plan none[] = {{.modes = 0}, {.modes = VI_LANES_MODES + 1}, {.modes = 1, .contacts = -1},
-                                  {.modes = 1, .contacts = VI_LANES_CONTACTS + 1}, {.modes = 1, .instructions = 4}};
+    uint64_t seed = 18, hash = 14695981039346656037u;
+    const vi_lanes_plan none[] = {{.modes = 0},
+                                  {.modes = VI_LANES_MODES + 1},
+                                  {.modes = 1, .contacts = -1},
+                                  {.modes = 1, .contacts = VI_LANES_CONTACTS + 1},
+                                  {.modes = 1, .instructions = 4}};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
         CHECK(vi_door_lanes_memory(&none[i]) == 0, "plan %zu to be refused", i);
     }
     for (int modes = 1; modes <= VI_LANES_MODES; ++modes) {
         for (int contacts = 0; contacts <= VI_LANES_CONTACTS; ++contacts) {
-            check_sizes(modes, contacts, &seed);
+            check_sizes(modes, contacts, &seed, &hash);
         }
     }
+    check_functions(&seed);
+    CHECK(hash == BITS, "the bits of every machine, got the hash %016" PRIx64, hash);
     return 0;
 }

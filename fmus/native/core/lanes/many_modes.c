@@ -89,7 +89,8 @@ static motion motion_from(const vi_lane_group *g, int lane, int modes, const pla
     return m;
 }
 
-static vi_lane_cell point_motion(const vi_lane_group *g, int lane, int modes, int point, const motion *m, const place *s)
+static vi_lane_cell point_motion(const vi_lane_group *g, int lane, int modes, int point, const motion *m,
+                                 const place *s)
 {
     const vi_many_modes *many = &g->many;
     const double c = many->cosine[point][lane], n = many->sine[point][lane];
@@ -197,7 +198,8 @@ static double crest(const vi_lane_group *g, int lane, int modes, double sign, do
 }
 
 /* The same over whole cells of a level; a cell with a crest that may be the largest is taken apart. */
-static double extend(const vi_lane_group *g, int lane, int modes, double sign, int level, int cells, place s, double most)
+static double extend(const vi_lane_group *g, int lane, int modes, double sign, int level, int cells, place s,
+                     double most)
 {
     const int last = (int)g->many.last[lane];
     const bulges b = bulges_of(g, lane, modes, level, &s);
@@ -423,6 +425,21 @@ static bool take_contact(vi_lane_group *g, int lane, int c, int modes, const vi_
     return isfinite(g->many.size[c][lane]);
 }
 
+/* Displacement and velocity of an unforced mode after some time, see `vi_mode_propagator`. */
+static void propagate(const vi_mode *mode, double u, double phi[4])
+{
+    vi_mode_functions f = {0};
+    double unused;
+    f.slow = vi_lane_decay(mode->slow * u, &unused);
+    if (mode->regime == VI_OVERDAMPED) {
+        f.fast = vi_lane_decay(mode->fast * u, &unused);
+        (void)vi_lane_decay(2.0 * mode->rate * u, &f.lost);
+    } else {
+        vi_lane_turn(mode->rate * u, &f.cosine, &f.sine);
+    }
+    vi_mode_propagator_by(mode, u, &f, phi);
+}
+
 static void take_steps(vi_lane_group *g, int lane, int modes, const vi_mode mode[])
 {
     vi_many_modes *many = &g->many;
@@ -430,7 +447,7 @@ static void take_steps(vi_lane_group *g, int lane, int modes, const vi_mode mode
         const double length = many->cells[level][lane] * g->cell[lane];
         for (int j = 0; j < modes; ++j) {
             double phi[4];
-            vi_mode_propagator(&mode[j], length, phi);
+            propagate(&mode[j], length, phi);
             for (int i = 0; i < 4; ++i) {
                 many->step[level][j][i][lane] = phi[i];
             }

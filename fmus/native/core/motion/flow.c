@@ -70,45 +70,66 @@ typedef struct {
     double slow, fast;   /* the two decaying exponentials */
 } propagator;
 
-static propagator propagate_overdamped(const vi_mode *mode, double u)
+static propagator overdamped(const vi_mode *mode, double slow, double fast, double lost)
 {
-    propagator p;
-    p.slow = exp(-mode->slow * u);
-    p.fast = exp(-mode->fast * u);
-    p.e_cos = 0.5 * (p.slow + p.fast);
-    p.e_sin = p.slow * (-expm1(-2.0 * mode->rate * u) / (2.0 * mode->rate));
+    propagator p = {.slow = slow, .fast = fast};
+    p.e_cos = 0.5 * (slow + fast);
+    p.e_sin = slow * (lost / (2.0 * mode->rate));
     /* far from critical Ce - decay Se cancels; near it the two exponentials do */
-    p.back = mode->rate > 0.5 * mode->decay
-                 ? (mode->fast * p.fast - mode->slow * p.slow) / (2.0 * mode->rate)
-                 : p.e_cos - mode->decay * p.e_sin;
+    p.back = mode->rate > 0.5 * mode->decay ? (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate)
+                                            : p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+static inline propagator underdamped(const vi_mode *mode, double decay, double cosine, double sine)
+{
+    propagator p = {.slow = decay, .fast = decay};
+    p.e_cos = decay * cosine;
+    p.e_sin = decay * (sine / mode->rate);
+    p.back = p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+static inline propagator critical(const vi_mode *mode, double decay, double u)
+{
+    propagator p = {.slow = decay, .fast = decay};
+    p.e_cos = decay;
+    p.e_sin = decay * u;
+    p.back = p.e_cos - mode->decay * p.e_sin;
     return p;
 }
 
 static inline propagator propagate(const vi_mode *mode, double u)
 {
     if (mode->regime == VI_OVERDAMPED) {
-        return propagate_overdamped(mode, u);
+        return overdamped(mode, exp(-mode->slow * u), exp(-mode->fast * u), -expm1(-2.0 * mode->rate * u));
     }
-    propagator p;
-    p.slow = p.fast = exp(-mode->decay * u);
-    if (mode->regime == VI_UNDERDAMPED) {
-        p.e_cos = p.slow * cos(mode->rate * u);
-        p.e_sin = p.slow * (sin(mode->rate * u) / mode->rate);
-    } else {
-        p.e_cos = p.slow;
-        p.e_sin = p.slow * u;
-    }
-    p.back = p.e_cos - mode->decay * p.e_sin;
-    return p;
+    const double decay = exp(-mode->decay * u);
+    return mode->regime == VI_UNDERDAMPED ? underdamped(mode, decay, cos(mode->rate * u), sin(mode->rate * u))
+                                          : critical(mode, decay, u);
+}
+
+static void take_rows(const vi_mode *mode, const propagator *p, double phi[4])
+{
+    phi[0] = p->e_cos + mode->decay * p->e_sin;
+    phi[1] = p->e_sin;
+    phi[2] = -mode->stiffness * p->e_sin;
+    phi[3] = p->back;
 }
 
 void vi_mode_propagator(const vi_mode *mode, double u, double phi[4])
 {
     const propagator p = propagate(mode, u);
-    phi[0] = p.e_cos + mode->decay * p.e_sin;
-    phi[1] = p.e_sin;
-    phi[2] = -mode->stiffness * p.e_sin;
-    phi[3] = p.back;
+    take_rows(mode, &p, phi);
+}
+
+void vi_mode_propagator_by(const vi_mode *mode, double u, const vi_mode_functions *functions, double phi[4])
+{
+    const vi_mode_functions *f = functions;
+    const propagator p = mode->regime == VI_OVERDAMPED    ? overdamped(mode, f->slow, f->fast, f->lost)
+                         : mode->regime == VI_UNDERDAMPED ? underdamped(mode, f->slow, f->cosine, f->sine)
+                                                          : critical(mode, f->slow, u);
+    take_rows(mode, &p, phi);
 }
 
 /* `u` seconds after the start of a segment that is counted from before: the phase angle to twice the digits, so that it
@@ -229,14 +250,14 @@ static void split_at(const vi_segment *s, double u, vi_motion *m)
 /* ---- the series form ---- */
 
 /* 1 / ((n + 1) (n + 2)), by which the equation gives a Taylor coefficient from those before it: no division waits. */
-static const double SHARE[VI_SERIES_ORDER - 1] = {
-    1.0 / 2.0,   1.0 / 6.0,   1.0 / 12.0,  1.0 / 20.0,  1.0 / 30.0,  1.0 / 42.0,  1.0 / 56.0,
-    1.0 / 72.0,  1.0 / 90.0,  1.0 / 110.0, 1.0 / 132.0, 1.0 / 156.0, 1.0 / 182.0, 1.0 / 210.0,
-    1.0 / 240.0, 1.0 / 272.0, 1.0 / 306.0, 1.0 / 342.0, 1.0 / 380.0};
+static const double SHARE[VI_SERIES_ORDER - 1] = {1.0 / 2.0,   1.0 / 6.0,   1.0 / 12.0,  1.0 / 20.0,  1.0 / 30.0,
+                                                  1.0 / 42.0,  1.0 / 56.0,  1.0 / 72.0,  1.0 / 90.0,  1.0 / 110.0,
+                                                  1.0 / 132.0, 1.0 / 156.0, 1.0 / 182.0, 1.0 / 210.0, 1.0 / 240.0,
+                                                  1.0 / 272.0, 1.0 / 306.0, 1.0 / 342.0, 1.0 / 380.0};
 /* n (n - 1) (n - 2) (n - 3), by which the fourth derivative has a Taylor coefficient. */
-static const double FOURTH[VI_SERIES_ORDER + 1] = {
-    0.0,    0.0,     0.0,     0.0,     24.0,    120.0,   360.0,   840.0,   1680.0,  3024.0,  5040.0,
-    7920.0, 11880.0, 17160.0, 24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
+static const double FOURTH[VI_SERIES_ORDER + 1] = {0.0,     0.0,     0.0,     0.0,     24.0,    120.0,   360.0,
+                                                   840.0,   1680.0,  3024.0,  5040.0,  7920.0,  11880.0, 17160.0,
+                                                   24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
 
 /* Modes whose coefficients are found side by side: each of a mode waits for the one before it. */
 enum { ABREAST = 8 };
@@ -415,8 +436,9 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
     }
 }
 
-void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[], const double v[],
-                             vi_phase phase, const double held[], const double held_rate[], double length)
+void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[],
+                             const double v[], vi_phase phase, const double held[], const double held_rate[],
+                             double length)
 {
     int j = 0;
     for (; j < count; ++j) {

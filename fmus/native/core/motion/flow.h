@@ -85,8 +85,9 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
                       double held_rate, double length, bool local);
 
 /* Begin local segments of several modes at one instant, each as one alone is begun. */
-void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[], const double v[],
-                             vi_phase phase, const double held[], const double held_rate[], double length);
+void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[],
+                             const double v[], vi_phase phase, const double held[], const double held_rate[],
+                             double length);
 
 /* Count the homogeneous part of a split segment, whose mode is underdamped, from its state (x, v), of that
  * amplitude, `since` seconds (with their rounding) before the start, on the same motion: what rounding has added meanwhile is left behind. */
@@ -96,6 +97,16 @@ vi_phase vi_phase_of(double angle);
 
 /* Displacement and velocity after `u` >= 0 of the unforced mode: x = phi[0] x0 + phi[1] v0, v = phi[2] x0 + phi[3] v0. */
 void vi_mode_propagator(const vi_mode *mode, double u, double phi[4]);
+
+/* Functions of the time u that a propagator is made of. */
+typedef struct {
+    double slow, fast;   /* exp(-slow u) and exp(-fast u) of an overdamped mode; of others both are exp(-decay u) */
+    double lost;         /* of an overdamped mode: 1 - exp(-2 rate u) */
+    double cosine, sine; /* of an underdamped mode: of rate u */
+} vi_mode_functions;
+
+/* The same from functions that the caller has found in its own way. */
+void vi_mode_propagator_by(const vi_mode *mode, double u, const vi_mode_functions *functions, double phi[4]);
 
 /* The motion at the start, from the state (x, v) that the segment was begun with: no rounding, no evaluation. */
 void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *motion);

@@ -172,7 +172,7 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
                           double u)
 {
     const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
-    const double piece = vi_drift_variable(drift, u) / DRIFT_PIECES;
+    const double piece = vi_drift_variable(drift, u) / (double)DRIFT_PIECES;
     double q[VI_MODES], p[VI_MODES], weight, value[4];
     for (int i = 0; i < 8 * DRIFT_PIECES; ++i) {
         const double r = node((double)(i / 8) * piece, piece, i % 8, &weight), t = drift->rooted ? r * r : r;
