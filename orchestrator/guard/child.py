@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -146,6 +147,7 @@ def main(bell: int | None) -> None:
     except VibroimpactError as error:
         answers.put(Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
+    gc.freeze()  # what is there stays there: no collection need look at it
     answers.put(identity_of(runner))
     while (batch := receive(orders)) is not None:
         _serve(runner, batch, notes, answers)
