@@ -47,7 +47,7 @@ from vibroimpact.orchestrator.scene.models import Record
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
-ENGINE = 4
+ENGINE = 5
 """Version of what follows our bodies, in C; with another one results differ, and no campaign mixes two."""
 
 SAMPLES_OF_A_BLOCK = 16_384

@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.study.equal_restitution import laws_of_equal_resti
 FREQUENCY = "forcing.angular_frequency"
 LONG = {
     "transient_periods": 4000,
-    "recorded_periods": 64,
+    "recorded_periods": 256,  # beside a fold chaos stays near the lost orbit for some tens
     "impacts": True,
     "extrema": True,
     "strobe": True,

@@ -4,6 +4,8 @@
 
 #include "motion/ripple.h"
 
+static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
+
 void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const double q[], const double p[],
                      vi_phase phase, const double held[], const double held_rate[], double length, bool local)
 {
@@ -135,8 +137,8 @@ void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], 
 void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instant, double moment, double q[],
                         double p[], vi_phase *phase)
 {
-    const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment / 3.0;
-    const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn / 6.0);
+    const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment * THIRD;
+    const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn * SIXTH);
     const double c = instant->cosine * less - instant->sine * more, s = instant->sine * less + instant->cosine * more;
     *phase = (vi_phase){flight->phase.angle + w * (instant->u + moment), c, s};
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {

@@ -17,6 +17,9 @@ enum { STEEPEST_RISE = 3 };
 /* Blocks of samples after which a scan ends where it is. */
 enum { MOST_BLOCKS = 4096 };
 enum { MOST_ITERATIONS = 8 };
+static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
+/* Newton's step, in intervals between samples, whose square is as good as a guess can be. */
+static const double CLOSE = 3e-4;
 
 /* ---- propagators ---- */
 
@@ -42,7 +45,7 @@ static void renew(vi_scan *scan, const vi_structure_model *model)
 
 static double step_of(const vi_structure_model *model, int l)
 {
-    return SHORTEST_STEP / model->fastest * (double)(1 << l);
+    return SHORTEST_STEP * model->radian * (double)(1 << l);
 }
 
 static void make(vi_scan_level *level, const vi_scan *scan, const vi_structure_model *model, int l)
@@ -161,7 +164,7 @@ static opening opening_of(const scanner *s, int k, double step)
             o.off_cubic += e->fourth[j] * share;
         }
     }
-    o.rate = SHARE_OF_RATE * o.off_cubic + speed * (step / 3.0);
+    o.rate = SHARE_OF_RATE * o.off_cubic + speed * (step * THIRD);
     o.ripple += ROUNDING * point->scale;
     return o;
 }
@@ -169,8 +172,8 @@ static opening opening_of(const scanner *s, int k, double step)
 /* By how much acceleration may bring a contact that leaves its stop back within a step, m/s. */
 static double speed_back(const vi_approach *p, double step)
 {
-    return vi_max(0.0, p->acceleration) * (0.5 * step) + vi_max(0.0, p->jerk) * (step * step / 6.0)
-           + p->bound * (step * step * step / 24.0);
+    return vi_max(0.0, p->acceleration) * (0.5 * step) + vi_max(0.0, p->jerk) * (step * step * SIXTH)
+           + p->bound * (step * step * step * (0.25 * SIXTH));
 }
 
 /* Does the contact begin on its stop? */
@@ -220,9 +223,9 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
     const vi_point *point = &s->points[k];
     const place *at = &s->at;
     const double w = s->flight->angular_frequency, square = level->step * level->step;
-    const double share = SHARE_OF_FOURTH * square * square, part = level->step / 3.0;
+    const double share = SHARE_OF_FOURTH * square * square, part = level->step * THIRD;
     const double start = point->offset - point->sign * (point->level + point->level_rate * at->u);
-    const double rise = -point->sign * point->level_rate * level->step;
+    const double rise = -point->sign * point->level_rate * level->step, third_of_rise = rise * THIRD;
     double c = 0.0, n = 0.0;
     if (!ripples(w * w * w * w, share, 1.0)) {
         c = -point->sign * (point->cosine * at->cosine + point->sine * at->sine);
@@ -231,10 +234,10 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
     const double cw = part * w * c, nw = part * w * n;
     double *restrict clearance = out->clearance + 1, *restrict third = out->third + 1;
     out->clearance[0] = start + c;
-    out->third[0] = rise / 3.0 + nw;
+    out->third[0] = third_of_rise + nw;
     for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
         clearance[i] = start + (double)(i + 1) * rise + c * level->cosine[i] + n * level->sine[i];
-        third[i] = rise / 3.0 + nw * level->cosine[i] - cw * level->sine[i];
+        third[i] = third_of_rise + nw * level->cosine[i] - cw * level->sine[i];
     }
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
         if (ripples(s->extent[k].fourth[j], share, s->extent[k].reach[j])) {
@@ -380,7 +383,7 @@ static double guess(const vi_approach *a, const vi_approach *b, double step)
         if (!(next >= low && next <= high)) {
             next = 0.5 * (low + high);
         }
-        if (fabs(next - t) < 1e-7) {
+        if (fabs(next - t) < CLOSE) {
             return next * step;
         }
         t = next;

@@ -54,8 +54,7 @@ static void record_period(const vi_structure *s)
 /* For how long a contact just released stays on its stop, s. */
 static double one_release(const vi_structure *s)
 {
-    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
-    return ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, s->state->now)));
+    return ONE_RELEASE * (s->model->radian + fabs(vi_clock_time(&s->model->clock, s->state->now)));
 }
 
 /* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
@@ -94,16 +93,16 @@ static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 static bool bounces_high(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
-    const double time = 1.0 / model->fastest;
+    const double time = 2.0 * VI_LOW_BOUNCE * model->radian;
     for (int k = 0; k < model->contacts; ++k) {
         if (!vi_structure_watched(s, k)) {
             continue;
         }
         const double clearance = vi_max(0.0, vi_structure_clearance(s, k)), v = vi_structure_approach(s, k);
-        const double flight = vi_parabola_root(clearance, v, vi_structure_most_acceleration(s, k));
+        const double most = vi_structure_most_acceleration(s, k);
         const bool lingers = s->state->status[k] == VI_CONTACT_TOUCHING
-                             && fabs(v) * time < VI_LINGERING * vi_structure_displacement_size(s, k);
-        if (lingers || !(flight * model->fastest > 2.0 * VI_LOW_BOUNCE)) {
+                             && fabs(v) * model->radian < VI_LINGERING * vi_structure_displacement_size(s, k);
+        if (lingers || !(clearance > time * (v + 0.5 * time * most))) {
             return false;
         }
     }

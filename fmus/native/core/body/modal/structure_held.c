@@ -110,7 +110,6 @@ static void carry(vi_series_noise *noise)
 
 void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const vi_drift *drift)
 {
-    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
     noise->s = s;
     noise->drift = drift;
     noise->drive = 1.0;
@@ -119,7 +118,8 @@ void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const 
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const vi_mode *mode = &s->model->mode[j];
         const double loads = fabs(mode->force) + fabs(noise->held[j]);
-        const double velocity = fabs(drift->modal[1][j]) + mode->natural * fabs(s->state->q[j]) + loads * radian;
+        const double within = mode->natural * fabs(s->state->q[j]) + loads * s->model->radian;
+        const double velocity = fabs(drift->modal[1][j]) + within;
         noise->before[j] = 0.0; /* the series begins where the body is */
         noise->last[j] = VI_ROUNDING * velocity;
     }

@@ -13,6 +13,7 @@ static const double LAST_STEP = 1e-5;
 static const double NEAR = 6e-6;
 /* Evaluations between two scans, where the first has come to nothing. */
 enum { PATIENCE = 4 };
+static const double SIXTH = 1.0 / 6.0;
 /* Iterations towards a contact that is known to be between two instants; two are usual. */
 enum { MOST_ITERATIONS = 16 };
 
@@ -112,7 +113,7 @@ static double step_to_zero(const vi_approach *p)
         return NAN;
     }
     const double step = 2.0 * p->clearance / (p->velocity + sqrt(square));
-    return step - p->jerk * (step * step * step / 6.0) / (p->velocity + p->acceleration * step);
+    return step - p->jerk * (step * step * step * SIXTH) / (p->velocity + p->acceleration * step);
 }
 
 /* Is what the cubic leaves out of the displacement, and of the velocity, less than their roundings? */

@@ -58,6 +58,7 @@ void vi_structure_prepare(vi_structure_model *model)
         const double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
         model->fastest = vi_max(model->fastest, rate);
     }
+    model->radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
 }
 
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)
@@ -170,13 +171,12 @@ double vi_structure_displacement_size(const vi_structure *s, int k)
 double vi_structure_velocity_size(const vi_structure *s, int k)
 {
     const vi_structure_model *model = s->model;
-    const double radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
     double sum = 0.0;
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const double loads = fabs(mode->force) + fabs(s->state->held[j]);
         sum += fabs(model->shape[k][j])
-               * (fabs(s->state->p[j]) + mode->natural * fabs(s->state->q[j]) + loads * radian);
+               * (fabs(s->state->p[j]) + mode->natural * fabs(s->state->q[j]) + loads * model->radian);
     }
     return sum;
 }

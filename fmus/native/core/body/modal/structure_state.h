@@ -45,6 +45,7 @@ typedef struct {
     double mobility_low[VI_PORTS][VI_PORTS]; /* its rounding: else it adds up over elastic impacts, always one way */
     double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
     double fastest;                      /* largest rate of any mode, rad/s */
+    double radian;                       /* time in which that turns by one, s; 0 where nothing turns */
 } vi_structure_model;
 
 /* How a contact of a structure stands. */
