@@ -33,7 +33,7 @@ help: ## show this
 demo: $(VENV)/demo.stamp $(VENV)/fmus.stamp ## run the demonstration campaign; leaves a dataset and a figure
 	$(BIN)/vibroimpact demo
 
-fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the tests that take less than a minute, of every room; says what it left out
+fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the quick tests of every room, in some minutes; says what it left out
 	$(BIN)/python -m pytest -q --fast $(PARALLEL)
 
 test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but benchmarks and long series

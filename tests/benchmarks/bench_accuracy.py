@@ -237,8 +237,8 @@ def study(name: str, text: str, repetitions: int) -> str:
     )
 
 
-def main() -> None:
-    """Print the table."""
+def main() -> int:
+    """Print the table; return 1 if a goal is missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -248,7 +248,7 @@ def main() -> None:
     if options.child:
         scene, tuned, labels, chosen, repetitions = json.loads(options.child)
         print(json.dumps(judged(Path(scene), Path(tuned), labels, chosen, repetitions)))
-        return
+        return 0
     print(
         f"| scene | study | recommended for {TOLERANCE:g} | anew | over the cheapest | error, unseen | goals |"
     )
@@ -260,7 +260,8 @@ def main() -> None:
     missed = sum("MISSED" in row for row in rows)
     met = len(rows) - missed
     print(f"The recommendation was adequate and at most {GOAL:g} times the cheapest in {met} of {len(rows)}.")
+    return 0 if missed == 0 else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

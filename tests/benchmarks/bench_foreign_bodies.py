@@ -258,14 +258,15 @@ def impact_table(folder: Path) -> None:
         print(f"  {kind:34}{statistics.median(found) * 1e6:10.1f}{min(found) * 1e6:10.1f}")
 
 
-def main() -> None:
-    """Measure, print, leave datasets and figures."""
+def main() -> int:
+    """Measure, print, leave datasets and figures; return 1 if a goal is missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
+    held = True
     with tempfile.TemporaryDirectory() as made:
         for law in STIFFNESS:
             dataset = ladder(law, Path(made))
@@ -275,13 +276,15 @@ def main() -> None:
             print(f"  dataset: {path}")
             draw(dataset, path.with_suffix(".png"))
             worst = float(np.abs(dataset["energy_drift"].values[1:, list(STEPS).index(DEFAULT_STEPS)]).max())
+            held = held and worst <= GOAL
             verdict = "met" if worst <= GOAL else "MISSED"
             print(
                 f"  [[contact]] at {DEFAULT_STEPS} steps: {worst:.1e} of the energy; goal <= {GOAL:g}: {verdict}"
             )
         rigid_table(Path(made))
         impact_table(Path(made))
+    return 0 if held else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
