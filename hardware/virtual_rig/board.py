@@ -28,7 +28,7 @@ MOST_ON_DEMAND = 1_000
 """Samples per channel of a call without a sample clock: it holds the rig meanwhile."""
 MOST_AT_ONCE = 20_000
 """Samples of one advance, so that a call never waits for long."""
-PERIOD = 0.002
+PERIOD = 0.004
 """Between two advances while a clock runs, s."""
 
 
