@@ -54,6 +54,9 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.analysis.spikes import Mechanics as Mechanics
     from vibroimpact.analysis.spikes import SpikeSettings as SpikeSettings
     from vibroimpact.analysis.spikes import spike_report as spike_report
+    from vibroimpact.exchange import export_fmu as export_fmu
+    from vibroimpact.exchange import export_ssp as export_ssp
+    from vibroimpact.exchange import import_ssp as import_ssp
     from vibroimpact.fmus.errors import VibroimpactError as VibroimpactError
     from vibroimpact.hardware.programs.record import record as record
     from vibroimpact.hardware.programs.recover import recover as recover
@@ -64,6 +67,8 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.hardware.recordings import import_recording as import_recording
     from vibroimpact.orbits import basins as basins
     from vibroimpact.orbits import control as control
+    from vibroimpact.orbits import find_orbits as find_orbits
+    from vibroimpact.orbits import follow as follow
     from vibroimpact.orbits import maps as maps
     from vibroimpact.orchestrator.orbits.energies import energies as energies
     from vibroimpact.orchestrator.orbits.lyapunov import lyapunov as lyapunov
@@ -75,12 +80,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.simulation import campaign as campaign
     from vibroimpact.simulation import cost_of as cost_of
     from vibroimpact.simulation import effects as effects
-    from vibroimpact.simulation import export_fmu as export_fmu
-    from vibroimpact.simulation import export_ssp as export_ssp
-    from vibroimpact.simulation import find_orbits as find_orbits
-    from vibroimpact.simulation import follow as follow
     from vibroimpact.simulation import hard_cases as hard_cases
-    from vibroimpact.simulation import import_ssp as import_ssp
     from vibroimpact.simulation import replay as replay
     from vibroimpact.simulation import run as run
     from vibroimpact.simulation import sensitivity as sensitivity
@@ -108,6 +108,7 @@ _NAMES = {
     ),
     "analysis.spectral_density": ("spectral_density",),
     "analysis.spikes": ("Mechanics", "SpikeSettings", "spike_report"),
+    "exchange": ("export_fmu", "export_ssp", "import_ssp"),
     "fmus.errors": ("VibroimpactError",),
     "hardware.programs.record": ("record",),
     "hardware.programs.recover": ("recover",),
@@ -115,7 +116,7 @@ _NAMES = {
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
-    "orbits": ("basins", "control", "maps"),
+    "orbits": ("basins", "control", "find_orbits", "follow", "maps"),
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),
     "orchestrator.orbits.resonances": ("resonances",),
@@ -128,11 +129,6 @@ _NAMES = {
         "cost_of",
         "effects",
         "hard_cases",
-        "export_fmu",
-        "export_ssp",
-        "find_orbits",
-        "follow",
-        "import_ssp",
         "replay",
         "run",
         "sensitivity",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
@@ -36,3 +37,23 @@ def given_scene(given: SceneLike) -> Scene:
         f"scene: expected a Scene, the path of one or its tables, got {type(given).__name__}. "
         "Scene.from_text reads TOML text."
     )
+
+
+def given_path(given: object) -> Path:
+    """Return the file or folder that a caller names.
+
+    Raises
+    ------
+    UsageError
+        It is no name.
+    """
+    if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
+        raise UsageError(f"path: expected the name of a file or folder, got {given!r}.")
+    return Path(given)
+
+
+def given_paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
+    """Return the files that a caller names, one or several, as `given_path` does."""
+    if isinstance(given, str | os.PathLike) or not isinstance(given, Iterable):
+        return [given_path(given)]
+    return [given_path(one) for one in given]

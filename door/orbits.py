@@ -1,13 +1,20 @@
-"""Maps, basins and control of orbits: thin over the functions that the commands stand on."""
+"""Orbits, branches, maps, basins and control: thin over the functions that the commands stand on."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from vibroimpact.analysis.dataset import open_dataset, write_dataset
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.feedback import Law
-from vibroimpact.given import SceneLike, given_scene
+from vibroimpact.analysis.orbits.following import FollowSettings
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.given import PathLike, SceneLike, given_path, given_scene
 from vibroimpact.orchestrator.orbits.basins import (
     POINTS,
     Plane,
@@ -18,7 +25,140 @@ from vibroimpact.orchestrator.orbits.basins import (
 )
 from vibroimpact.orchestrator.orbits.control import run_plan
 from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
+from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
+from vibroimpact.orchestrator.orbits.follow import Followed, FollowedLoci, follow_branches, follow_loci
 from vibroimpact.orchestrator.orbits.maps import map_of, settings_of
+from vibroimpact.returned import ONE_AT_A_TIME, in_memory
+
+
+def find_orbits(
+    scene: SceneLike,
+    impacts: int | None = None,
+    periods: int | None = None,
+    *,
+    seed: Sequence[tuple[float, int]] | None = None,
+    penetrating: bool = False,
+) -> list[PeriodicOrbit]:
+    """Find periodic orbits of a scene, stable and unstable ones.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+    impacts, periods : int, optional
+        p and q of P(p,q). Without them, all orbits P(1,1), and the orbit that a long run ends on.
+    seed : sequence of (phase, stop), optional
+        Forcing phases, rad, of impacts near to those of one orbit, and their stops, from 1: that orbit alone.
+    penetrating : bool
+        Whether orbits that pass through a stop between impacts are returned as well.
+
+    Returns
+    -------
+    list of PeriodicOrbit
+        With `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable`, `highest` maximum between impacts.
+
+    Raises
+    ------
+    UsageError
+        Orbits of the scene are not followed.
+    OrbitError
+        There is no orbit near to the seed.
+
+    Examples
+    --------
+    >>> body = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
+    >>> stop, force = {"position": 1.0, "restitution": 0.7}, {"amplitude": 0.5, "angular_frequency": 1.4}
+    >>> record = {"transient_periods": 0, "recorded_periods": 1}
+    >>> for orbit in find_orbits({"body": body, "forcing": force, "stop": [stop], "record": record}, 1):
+    ...     print(orbit.name, orbit.velocities.round(6), orbit.is_stable)
+    P(1,1) [1.884299] True
+    P(1,1) [0.787422] False
+    """
+    return orbits_of_scene(given_scene(scene), impacts, periods, seed=seed, penetrating=penetrating)
+
+
+def follow(
+    scene: SceneLike,
+    parameter: str,
+    start: float,
+    stop: float,
+    path: PathLike | None = None,
+    *,
+    impacts: int | None = None,
+    periods: int = 1,
+    seed: Sequence[tuple[float, int]] | None = None,
+    doublings: int = 1,
+    step: float = 0.01,
+    second: str | None = None,
+    second_range: tuple[float, float] | None = None,
+) -> xr.Dataset:
+    """Follow periodic orbits of a scene over one of its numbers, through folds and period doublings.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+    parameter : str
+        Key of a number, such as `forcing.angular_frequency`.
+    start, stop : float
+        Its range.
+    path : path, optional
+        The dataset to write as well (.nc).
+    impacts, periods : int, optional
+        p and q of the orbits to begin with, which are looked for along the range; P(1,1).
+    seed : sequence of (phase, stop), optional
+        Forcing phases, rad, of impacts near to those of one orbit of the scene as it is, and their stops, from 1: that
+        orbit is followed both ways.
+    doublings : int
+        How often branches of twice the period are followed on.
+    step : float
+        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
+    second : str, optional
+        Another number: folds, period doublings and grazes are followed over both.
+    second_range : tuple of float, optional
+        Its range.
+
+    Returns
+    -------
+    xarray.Dataset
+        Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
+        `second`, each is an orbit at a bifurcation, where there are any.
+
+    Raises
+    ------
+    UsageError
+        Orbits of the scene are not followed, or a parameter is no number of it.
+    OrbitError
+        There is no orbit to begin with.
+
+    Examples
+    --------
+    >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
+    """
+    chosen = given_scene(scene)
+    alone = chosen.with_sweep({}) if chosen.sweep else chosen
+    if (second is None) != (second_range is None):
+        raise UsageError("follow: second: expected a key and its range together, got one of them.")
+    followed = follow_branches(
+        alone,
+        parameter,
+        start,
+        stop,
+        impacts=impacts,
+        periods=periods,
+        seed=seed,
+        doublings=doublings,
+        longest=step,
+    )
+    result: Followed | FollowedLoci = followed
+    if second is not None and second_range is not None:
+        ranges = [FollowSettings(min(ends), max(ends), step) for ends in ((start, stop), second_range)]
+        loci = follow_loci(FollowedLoci(followed, second), *ranges)
+        result = loci if loci.loci else followed
+    with ONE_AT_A_TIME, ScratchFolder("orbits") as folder:
+        target = Path(folder.name, "branches.nc") if path is None else given_path(path)
+        write_dataset(result.dataset, target)
+        return open_dataset(target) if path is not None else in_memory(target)
 
 
 def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:

@@ -3,44 +3,31 @@
 from __future__ import annotations
 
 import os
-import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset import open_dataset, write_dataset
+from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.analysis.orbits import PeriodicOrbit
-from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.given import PathLike, SceneLike, given_scene
+from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.hard_cases import dataset_of as hard_cases_dataset
 from vibroimpact.orchestrator.hard_cases import measured_cases
-from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
-from vibroimpact.orchestrator.orbits.follow import Followed, FollowedLoci, follow_branches, follow_loci
 from vibroimpact.orchestrator.replay.replaying import replay_scene
-from vibroimpact.orchestrator.run.export import export_scene
-from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.ssp import (
-    export_system,
-    import_system,
-    load_system,
-    refuse_system_elsewhere,
-)
+from vibroimpact.orchestrator.ssp import refuse_system_elsewhere
 from vibroimpact.orchestrator.study import BUDGET, refuse_unreached, study_accuracy
 from vibroimpact.orchestrator.study import dataset_of as accuracy_dataset
 from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
 from vibroimpact.orchestrator.study.preparation import prepared_scene, with_found_modes
-
-_ONE_AT_A_TIME = threading.Lock()
+from vibroimpact.returned import ONE_AT_A_TIME, in_memory
 
 
 def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True) -> xr.Dataset:
@@ -73,16 +60,15 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     >>> str(run(tables).outcome.item())
     '0'
     """
-    chosen, target = prepared_scene(given_scene(scene)), None if path is None else _path(path)
-    # NetCDF's library is not for several threads at once
-    with _ONE_AT_A_TIME, _shown(progress) as shown:
+    chosen, target = prepared_scene(given_scene(scene)), None if path is None else given_path(path)
+    with ONE_AT_A_TIME, _shown(progress) as shown:
         if target is not None:
             run_scene(chosen, target, progress=shown)
             return open_dataset(target)
         with ScratchFolder("run") as folder:
             file = Path(folder.name, "run.nc")
             run_scene(chosen, file, progress=shown)
-            return _in_memory(file)
+            return in_memory(file)
 
 
 def campaign(
@@ -136,7 +122,7 @@ def campaign(
     with _shown(progress) as shown:
         report = run_campaign(
             prepared_scene(given_scene(scene)),
-            _path(folder),
+            given_path(folder),
             workers=workers,
             scheduler=scheduler,
             progress=shown,
@@ -188,10 +174,14 @@ def replay(
     """
     keys = fit if isinstance(fit, str) else ",".join(fit)
     whole = replay_scene(
-        given_scene(scene), _paths(recordings), fit=keys or None, score=_paths(score), execution=execution
+        given_scene(scene),
+        given_paths(recordings),
+        fit=keys or None,
+        score=given_paths(score),
+        execution=execution,
     )
     if path is not None:
-        write_results(whole.dataset, _path(path), kind="replay")
+        write_results(whole.dataset, given_path(path), kind="replay")
     return whole.dataset
 
 
@@ -240,7 +230,7 @@ def accuracy(
     )
     dataset = accuracy_dataset(study)
     if path is not None:
-        write_results(dataset, _path(path), kind="accuracy")
+        write_results(dataset, given_path(path), kind="accuracy")
     refuse_unreached(study)
     return dataset.assign_attrs(results_kind="accuracy")
 
@@ -275,7 +265,7 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     alone = chosen.with_sweep({}) if chosen.sweep else chosen
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
     if path is not None:
-        write_results(dataset, _path(path), kind="effects")
+        write_results(dataset, given_path(path), kind="effects")
     return dataset.assign_attrs(results_kind="effects")
 
 
@@ -320,142 +310,12 @@ def sensitivity(
     --------
     >>> sensitivity("campaign").total_order.sel(quantity="displacement_range")    # doctest: +SKIP
     """
-    opened = dataset if isinstance(dataset, xr.Dataset) else open_dataset(_path(dataset))
+    opened = dataset if isinstance(dataset, xr.Dataset) else open_dataset(given_path(dataset))
     names = [of] if isinstance(of, str) else list(of)
     found = sensitivity_report(opened, names, level=level, resamples=resamples, seed=seed)
     if path is not None:
-        write_results(found, _path(path), kind="sensitivity")
+        write_results(found, given_path(path), kind="sensitivity")
     return found.assign_attrs(results_kind="sensitivity")
-
-
-def find_orbits(
-    scene: SceneLike,
-    impacts: int | None = None,
-    periods: int | None = None,
-    *,
-    seed: Sequence[tuple[float, int]] | None = None,
-    penetrating: bool = False,
-) -> list[PeriodicOrbit]:
-    """Find periodic orbits of a scene, stable and unstable ones.
-
-    Parameters
-    ----------
-    scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
-    impacts, periods : int, optional
-        p and q of P(p,q). Without them, all orbits P(1,1), and the orbit that a long run ends on.
-    seed : sequence of (phase, stop), optional
-        Forcing phases, rad, of impacts near to those of one orbit, and their stops, from 1: that orbit alone.
-    penetrating : bool
-        Whether orbits that pass through a stop between impacts are returned as well.
-
-    Returns
-    -------
-    list of PeriodicOrbit
-        With `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable`, `highest` maximum between impacts.
-
-    Raises
-    ------
-    UsageError
-        Orbits of the scene are not followed.
-    OrbitError
-        There is no orbit near to the seed.
-
-    Examples
-    --------
-    >>> body = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
-    >>> stop, force = {"position": 1.0, "restitution": 0.7}, {"amplitude": 0.5, "angular_frequency": 1.4}
-    >>> record = {"transient_periods": 0, "recorded_periods": 1}
-    >>> for orbit in find_orbits({"body": body, "forcing": force, "stop": [stop], "record": record}, 1):
-    ...     print(orbit.name, orbit.velocities.round(6), orbit.is_stable)
-    P(1,1) [1.884299] True
-    P(1,1) [0.787422] False
-    """
-    return orbits_of_scene(given_scene(scene), impacts, periods, seed=seed, penetrating=penetrating)
-
-
-def follow(
-    scene: SceneLike,
-    parameter: str,
-    start: float,
-    stop: float,
-    path: PathLike | None = None,
-    *,
-    impacts: int | None = None,
-    periods: int = 1,
-    seed: Sequence[tuple[float, int]] | None = None,
-    doublings: int = 1,
-    step: float = 0.01,
-    second: str | None = None,
-    second_range: tuple[float, float] | None = None,
-) -> xr.Dataset:
-    """Follow periodic orbits of a scene over one of its numbers, through folds and period doublings.
-
-    Parameters
-    ----------
-    scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
-    parameter : str
-        Key of a number, such as `forcing.angular_frequency`.
-    start, stop : float
-        Its range.
-    path : path, optional
-        The dataset to write as well (.nc).
-    impacts, periods : int, optional
-        p and q of the orbits to begin with, which are looked for along the range; P(1,1).
-    seed : sequence of (phase, stop), optional
-        Forcing phases, rad, of impacts near to those of one orbit of the scene as it is, and their stops, from 1: that
-        orbit is followed both ways.
-    doublings : int
-        How often branches of twice the period are followed on.
-    step : float
-        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
-    second : str, optional
-        Another number: folds, period doublings and grazes are followed over both.
-    second_range : tuple of float, optional
-        Its range.
-
-    Returns
-    -------
-    xarray.Dataset
-        Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
-        `second`, each is an orbit at a bifurcation, where there are any.
-
-    Raises
-    ------
-    UsageError
-        Orbits of the scene are not followed, or a parameter is no number of it.
-    OrbitError
-        There is no orbit to begin with.
-
-    Examples
-    --------
-    >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
-    """
-    chosen = given_scene(scene)
-    alone = chosen.with_sweep({}) if chosen.sweep else chosen
-    if (second is None) != (second_range is None):
-        raise UsageError("follow: second: expected a key and its range together, got one of them.")
-    followed = follow_branches(
-        alone,
-        parameter,
-        start,
-        stop,
-        impacts=impacts,
-        periods=periods,
-        seed=seed,
-        doublings=doublings,
-        longest=step,
-    )
-    result: Followed | FollowedLoci = followed
-    if second is not None and second_range is not None:
-        ranges = [FollowSettings(min(ends), max(ends), step) for ends in ((start, stop), second_range)]
-        loci = follow_loci(FollowedLoci(followed, second), *ranges)
-        result = loci if loci.loci else followed
-    with _ONE_AT_A_TIME, ScratchFolder("orbits") as folder:
-        target = Path(folder.name, "branches.nc") if path is None else _path(path)
-        write_dataset(result.dataset, target)
-        return open_dataset(target) if path is not None else _in_memory(target)
 
 
 def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> xr.Dataset:
@@ -487,7 +347,7 @@ def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> 
     """
     found = hard_cases_dataset(measured_cases([only] if isinstance(only, str) else only))
     if path is not None:
-        write_results(found, _path(path), kind="hard_cases")
+        write_results(found, given_path(path), kind="hard_cases")
     return found.assign_attrs(results_kind="hard_cases")
 
 
@@ -511,160 +371,5 @@ def cost_of(scene: SceneLike) -> SceneCost:
     return scene_cost(with_found_modes(given_scene(scene)))
 
 
-def export_fmu(
-    scene: SceneLike,
-    path: PathLike,
-    *,
-    fmi: str = "3.0",
-    full: bool = False,
-    external: bool = False,
-    enumerations: bool = False,
-    platform: str | None = None,
-) -> Path:
-    """Write an FMU of a scene's body, stops and forcing, for another tool; components alone: `vi.fmus.export`.
-
-    Parameters
-    ----------
-    scene : Scene, path or mapping
-        Of one body. What it sweeps has the value that it has in its own table.
-    path : path
-        The file to write.
-    fmi, full, external, enumerations, platform
-        As `vibroimpact.fmus.export` has them.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    SceneError
-        With all problems of the scene, each on one line.
-    UsageError
-        The scene has another kind of body, or the file cannot be written.
-    ComponentError
-        There is no library for a platform, and nothing to compile it with.
-
-    Examples
-    --------
-    >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
-    """
-    return export_scene(
-        with_found_modes(given_scene(scene)),
-        _path(path),
-        fmi=fmi,
-        full=full,
-        external=external,
-        enumerations=enumerations,
-        platform=platform,
-    )
-
-
-def export_ssp(
-    scene: SceneLike,
-    path: PathLike,
-    *,
-    ssp: str = "1.0",
-    fmi: str | None = None,
-    gains: str = "component",
-    platform: str | None = None,
-) -> Path:
-    """Write a scene of components as a system (SSP) that other tools run; `import_ssp` gives it back.
-
-    Parameters
-    ----------
-    scene : Scene, path or mapping
-        With components.
-    path : path
-        The file to write.
-    ssp : str
-        `1.0` or `2.0`.
-    fmi : str, optional
-        Version of FMI of this package's components in the archive; by default 2.0, in SSP 2.0 that of the scene.
-    gains : str
-        How a connection has its gain: as a `component` with units of its own, or as a `transformation`.
-    platform : str, optional
-        As `vibroimpact.fmus.export` has it.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    SceneError
-        With all problems of the scene, each on one line.
-    UsageError
-        The scene has no components, or the file cannot be written.
-    ComponentError
-        There is no library for a platform, and nothing to compile it with.
-
-    Examples
-    --------
-    >>> export_ssp("two_oscillators.toml", "two.ssp")    # doctest: +SKIP
-    """
-    return export_system(given_scene(scene), _path(path), ssp=ssp, fmi=fmi, gains=gains, platform=platform)
-
-
-def import_ssp(
-    path: PathLike, output: PathLike | None = None, *, parameters: PathLike | Sequence[PathLike] = ()
-) -> Scene:
-    """Read a system (SSP 1.0 or 2.0) as a scene; `run`, `campaign` and `cost_of` take its path as it is.
-
-    Parameters
-    ----------
-    path : path
-        The archive.
-    output : path, optional
-        The scene file to write as well (.toml), with the FMUs in a folder beside it; files that are there and hold
-        something else are refused. Without one the FMUs lie unpacked until this process ends.
-    parameters : path or sequence of path
-        Parameter sets (.ssv), files or ones in the archive: one is applied, several become a sweep.
-
-    Returns
-    -------
-    Scene
-
-    Raises
-    ------
-    SceneError
-        What is wrong with the system, or with the scene that it makes.
-    ComponentFileError
-        The archive, or an FMU in it, is unsafe or damaged.
-    UsageError
-        The parameter sets make no sweep, or a file cannot be written.
-
-    Examples
-    --------
-    >>> import_ssp("two.ssp").with_sweep({"a.mass": [1.0, 2.0]})    # doctest: +SKIP
-    """
-    sets = _paths(parameters)
-    if output is None:
-        return load_system(_path(path), (), sets).scene
-    import_system(_path(path), _path(output), (), sets)
-    return Scene.from_file(output)
-
-
-def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
-    if isinstance(given, str | os.PathLike) or not isinstance(given, Iterable):
-        return [_path(given)]
-    return [_path(one) for one in given]
-
-
-def _path(given: object) -> Path:
-    if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
-        raise UsageError(f"path: expected the name of a file or folder, got {given!r}.")
-    return Path(given)
-
-
 def _shown(progress: bool) -> AbstractContextManager[Progress]:
     return shown_progress() if progress else nullcontext(Progress())
-
-
-def _in_memory(file: Path) -> xr.Dataset:
-    with open_dataset(file) as opened:
-        found = opened.load()
-    found.encoding.clear()
-    return found
