@@ -66,6 +66,8 @@ def opened(integrator: str, problem: Problem, steps: float, clock: Clock) -> Run
     import mujoco
     from mujoco import rollout
 
+    # else it writes a file where the command was given; a motion that fails shows in its error
+    mujoco.set_mju_user_warning(lambda _: None)
     count = math.ceil(problem.end / problem.period * steps)
     step = problem.end / count
     model: Any = mujoco.MjModel.from_xml_string(model_of(problem, step, integrator))
