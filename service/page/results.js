@@ -8,7 +8,7 @@ const TOLD = ["replay", "estimate"]; // their results are their figure and what 
 export class Results {
   constructor(job) {
     Object.assign(this, { id: job.id, shown: null });
-    this.log = element("pre", { class: "scroll tall log", tabindex: "0", "aria-label": "Log" });
+    this.log = element("pre", { class: "scroll tall log", role: "region", tabindex: "0", "aria-label": "Log" });
     this.said = element("details", { open: TOLD.includes(job.kind), ontoggle: () => this.readLog() }, element("summary", {}, "Log"), this.log);
     this.figure = element("div");
     this.files = element("div", { class: "row" });

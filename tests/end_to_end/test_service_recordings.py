@@ -98,7 +98,8 @@ def test_an_estimate_of_the_service_is_that_of_the_command_line(
     options = ("--channel", "board", "--from", "0.006", "--law", "viscous", "-o", str(target))
     assert in_this_process("estimate", "decay", str(file), *options).returncode == 0
     with vi.open_measured(target) as expected:
-        assert found.identical(expected.load())
+        assert found.equals(expected.load())
+        assert found.attrs == expected.attrs
     assert raw.get(f"/campaigns/{job.id}/figure").content[:4] == b"\x89PNG"
     assert "Estimates" in raw.get(f"/campaigns/{job.id}/log").text
     assert raw.get(f"/campaigns/{job.id}/scene").status_code == 409

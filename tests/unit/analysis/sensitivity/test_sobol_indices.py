@@ -48,7 +48,7 @@ def exact_g_function() -> tuple[Floats, Floats]:
 
 
 def points(power: int, keys: int, seed: int) -> tuple[Floats, Floats, Floats]:
-    both = qmc.Sobol(2 * keys, rng=seed).random_base2(power)
+    both = qmc.Sobol(2 * keys, seed=seed).random_base2(power)
     a, b = both[:, :keys], both[:, keys:]
     swapped = np.eye(keys, dtype=bool)
     return a, b, np.where(swapped, b[:, None], a[:, None])
