@@ -188,7 +188,7 @@ class Store:
         self.folder = folder
         self._lock = threading.RLock()
         self._connection = sqlite3.connect(
-            folder / DATABASE, HELD_SECONDS, check_same_thread=False, isolation_level=None
+            folder / DATABASE, timeout=HELD_SECONDS, check_same_thread=False, isolation_level=None
         )
         try:
             self._connection.execute("PRAGMA journal_mode = WAL")
