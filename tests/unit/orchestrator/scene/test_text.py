@@ -72,8 +72,8 @@ def test_a_new_number_changes_nothing_else_of_the_text(
     ],
 )  # fmt: skip
 def test_recordings_are_named_in_whatever_way_the_table_is_written(text: str, expected: str) -> None:
-    names = ['/tmp/a "1".nc', "/tmp/\N{GREEK SMALL LETTER OMEGA}\\.nc"]
-    shown = [r'"/tmp/a \"1\".nc"', '"/tmp/\N{GREEK SMALL LETTER OMEGA}\\\\.nc"']
+    names = ['/data/a "1".nc', "/data/\N{GREEK SMALL LETTER OMEGA}\\.nc"]
+    shown = [r'"/data/a \"1\".nc"', '"/data/\N{GREEK SMALL LETTER OMEGA}\\\\.nc"']
     filled = expected.replace("{}", "[{}, {}]") if expected.count("{}") == 1 else expected
     for name in shown:
         filled = filled.replace("{}", name, 1)
