@@ -211,7 +211,7 @@ def test_lists_are_read_in_pages(raw: httpx.Client) -> None:
     [
         ("[body]\nmass = -1", "expected a number > 0, got -1", 2),
         ("[body", "expected valid TOML", 1),
-        ("\n[component.a]\nfmu = '/elsewhere/own.fmu'\n", "This service loads no FMU but those of the package", 3),
+        ("\n[component.a]\nfmu = '/own/own.fmu'\n", "This service loads no FMU but those of the package", 3),
         (
             "\n\n[replay]\nrecordings = ['/etc/passwd']\n",
             "expected the name of a recording of this service",
