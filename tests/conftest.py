@@ -12,12 +12,18 @@ from typing import Any
 
 import hypothesis
 import pytest
+from _pytest.doctest import DoctestModule
+from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
 # Images of containers often forbid it: then each worker rewrites the assertions of every module of tests, and each
 # process that a test starts compiles the whole package.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# before a test imports them: this process is forked
+os.environ |= WITHOUT_THREADS
+
+pytest_plugins = ["harness.costs", "harness.side_by_side"]
 
 SEED = 4
 """Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""
@@ -31,13 +37,6 @@ FAST_FOLDERS = ("architecture", "unit")
 """All that `--fast` takes tests from."""
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return one more than there are processors: some tests wait, for a deadline or for processes of their own."""
-    usable = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-    return len(usable) + 1
-
-
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are marked neither slow nor long"
     parser.addoption("--fast", action="store_true", help=text)
@@ -49,6 +48,13 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     if not config.getoption("fast") or TESTS not in collection_path.parents:
         return None
     return True if collection_path.relative_to(TESTS).parts[0] not in FAST_FOLDERS else None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> Any:
+    """Let `--doctest-modules` look for examples in the package alone, which is given beside the tests."""
+    found = yield
+    return [one for one in found if not (isinstance(one, DoctestModule) and TESTS in file_path.parents)]
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -123,22 +129,14 @@ def pytest_runtest_call(item: pytest.Item) -> Any:
         handle.inner_test = original
 
 
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Hand over what was tried and left out, if this process runs only a share of the tests."""
-    output = getattr(session.config, "workeroutput", None)
-    if output is not None:
-        output["property_examples"] = session.config.stash.get(COUNTS, {})
-        output["slow"] = session.config.stash.get(SLOW, 0)
+def pytest_handed_over(config: pytest.Config) -> dict[str, Any]:
+    """Hand over what a copy of this process has tried."""
+    return {"examples": config.stash.get(COUNTS, {})}
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node: Any, error: object) -> None:
-    """Take over what a process tried and left out that ran a share of the tests."""
-    output = getattr(node, "workeroutput", {})
-    counts = node.config.stash.setdefault(COUNTS, {})
-    counts.update(output.get("property_examples", {}))
-    # each of them has left out the same
-    node.config.stash[SLOW] = output.get("slow", 0)
+def pytest_taken_over(config: pytest.Config, given: dict[str, Any]) -> None:
+    """Take over what a copy of this process has tried."""
+    config.stash.setdefault(COUNTS, {}).update(given["examples"])
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:

@@ -16,9 +16,11 @@ from pathlib import Path
 
 import pytest
 from distributed.security import Security
+from harness import warm
 from support.campaign_process import CampaignProcess, fork_servers_of, run_campaign_process, wait_until
 from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, scene_of
 from support.places import TESTS
+from support.served import DASK
 
 import vibroimpact.orchestrator.campaign.campaign as engine
 from vibroimpact.analysis.dataset import Outcome, read_flat
@@ -366,12 +368,7 @@ def started_cluster(address: str, *options: str) -> Iterator[None]:
     commands = [["scheduler", *place, "--no-dashboard", *options]]
     commands += [["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *options]] * 2
     processes = [
-        subprocess.Popen(
-            [sys.executable, "-m", "dask", *command],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        warm.start(DASK, *command, env=environment, stdout=warm.DEVNULL, stderr=warm.DEVNULL)
         for command in commands
     ]
     try:

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped, unused-ignore]
 import pytest
+from harness import warm
 from support import fmu_factory
 
 from vibroimpact.analysis.dataset import Outcome
@@ -198,7 +198,7 @@ runner = make_runner(parse_scene(Path(sys.argv[1]).read_text(), sys.argv[1]))
 print("ready", flush=True)
 runner.run({"culprit.u": 1.0})
 print("run", flush=True)
-sys.stdin.read()
+time.sleep(600.0)
 """
 
 
@@ -209,9 +209,8 @@ def test_nothing_of_a_component_outlives_a_parent_that_is_killed(folder: Path, m
     path.write_text(
         SCENE.format(major="3", fault=fault, place="step", after=0, deadline=600.0), encoding="utf-8"
     )
-    parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    # marked by its environment, which a copy has not been started with
+    parent = warm.start(PARENT, path, cold=True)
     assert parent.stdout is not None
     assert parent.stdout.readline() == "ready\n"
     if fault == "fork_away":

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -126,18 +124,9 @@ def test_a_campaign_over_a_single_component_finishes(tmp_path: Path) -> None:
 def test_a_law_in_python_is_exported_by_the_command_line_and_answers(tmp_path: Path) -> None:
     pytest.importorskip("pythonfmu", reason="needs pip install 'vibroimpact[python-fmus]'")
     law = EXAMPLES / "user_contact_law.py"
-    command = [
-        sys.executable,
-        "-m",
-        "vibroimpact.orchestrator.commands.cli",
-        "fmu",
-        "export",
-        "user-contact-law",
-    ]
     target = tmp_path / "user_contact_law.fmu"
-    subprocess.run(
-        [*command, "--law", str(law), "-o", str(target)], check=True, capture_output=True, timeout=120
-    )
+    done = vibroimpact("fmu", "export", "user-contact-law", "--law", law, "-o", target)
+    assert done.returncode == 0, done.stderr
     dataset = read_flat(ran(tmp_path, "user_contact_law"))
     assert np.allclose(np.diff(dataset.event_time.values), 2.0 * math.pi, atol=1e-9)
     comes_back(tmp_path, "user_contact_law")

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import psutil  # type: ignore[import-untyped, unused-ignore]
 import pytest
+from harness import warm
 from support import fmu_factory
+from support.command_line import vibroimpact
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
@@ -282,14 +284,7 @@ runner.run({"culprit.fault": 4.0})
 def test_a_hanging_component_does_not_outlive_its_parent(folder: Path, how: signal.Signals) -> None:
     path = folder / "orphan.toml"
     path.write_text(scene_text("3.0", 600.0), encoding="utf-8")
-    parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        # a shell that runs the tests in the background has it ignored
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    parent = warm.start(PARENT, path, stderr=warm.DEVNULL)
     assert parent.stdout is not None
     assert parent.stdout.readline() == "ready\n"
     supervised = hanging(psutil.Process(parent.pid))
@@ -325,9 +320,7 @@ def wait_until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
 
 
 def campaign(scene: Path, output: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    entry = "from vibroimpact.orchestrator.commands.cli import main; main()"
-    command = [sys.executable, "-c", entry, "campaign", str(scene), "-o", str(output), *options]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return vibroimpact("campaign", scene, "-o", output, *options)
 
 
 def test_a_campaign_goes_on_without_the_points_that_crash_hang_or_fail(folder: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from harness import warm
 from support.command_line import ENTRY, in_this_process
 
 SCENE = """
@@ -238,12 +239,7 @@ def test_a_command_whose_reader_has_gone_writes_what_it_computed(
     if command == "spikes":
         assert in_this_process("import", table, "-o", recording, "--unit", "N").returncode == 0
     given = {"import": table, "spikes": recording, "run": scene}[command]
-    with subprocess.Popen(
-        [sys.executable, "-c", ENTRY, command, given, "-o", output],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with warm.start(ENTRY, command, given, "-o", output) as process:
         assert process.stdout is not None
         process.stdout.close()
         assert process.stderr is not None
@@ -264,13 +260,7 @@ def test_text_for_a_disk_that_is_full_is_told_of_and_the_dataset_is_written(
     table.write_text("time,force\n" + "".join(f"{k / 1000:.3f},{k % 7}\n" for k in range(200)))
     given = {"import": [str(table), "-o", str(output), "--unit", "N"], "run": [str(scene), "-o", str(output)]}
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
-            [sys.executable, "-c", ENTRY, command, *given.get(command, [])],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        done = warm.run(ENTRY, command, *given.get(command, []), stdout=full)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
     assert "cannot be written" in done.stderr
     assert command == "--help" or xr.open_dataset(output).sizes

@@ -7,6 +7,7 @@ from ctypes import c_void_p
 from pathlib import Path
 
 import pytest
+from harness import warm
 from support.coupled_parts import VERSIONS, body, contact, external, stop, values
 from support.places import TESTS
 from support.saved_states import deserialize, serialize
@@ -95,8 +96,7 @@ def test_a_state_goes_on_in_another_process_as_in_its_own(tmp_path: Path, versio
         here.append([v.hex() for v in values(importer, "b", *OUTPUTS)])
     importer.free()
     code = GO_ON.format(tests=str(TESTS), here=str(Path(__file__).parent))
-    command = [sys.executable, "-c", code, json.dumps([kind, version, *moments])]
-    there = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    there = warm.run(code, json.dumps([kind, version, *moments]))
     assert there.returncode == 0, there.stderr
     assert [*map(json.loads, there.stdout.splitlines())] == here
 

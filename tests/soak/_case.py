@@ -63,7 +63,3 @@ def serve(package: str) -> None:
         name, seed = json.loads(line)
         answer = attempt(name, package, seed)
         print(json.dumps(answer), file=answers, flush=True)
-
-
-if __name__ == "__main__":
-    serve(sys.argv[1])

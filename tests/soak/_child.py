@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import IO
 
 import psutil
+from harness import warm
 from support.places import TESTS
 
 from soak._kinds import Kind
 
 WALL_PER_PROCESSOR_TIME = 5.0
 """On a machine that is shared, a case may take so much longer than its processor time."""
+CASES = "import sys; from soak._case import serve; serve(sys.argv[1])"
 START_SECONDS = 60.0
 """Processor time for starting Python and importing the package, added to the limit of a child's first case."""
 
@@ -44,13 +46,13 @@ class Child:
         # what is remembered of random files must not fill the cache of the person who starts this
         own = {"TMPDIR": str(self._folder), "VIBROIMPACT_CACHE": str(self._folder / "cache")}
         path = os.pathsep.join(filter(None, [str(TESTS), *(entry for entry in sys.path if entry)]))
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "soak._case", self.package],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
+        self._process = warm.start(
+            CASES,
+            self.package,
             cwd=self._folder,
             env=os.environ | own | {"PYTHONPATH": path},
+            stdin=subprocess.PIPE,
+            stderr=None,
             start_new_session=True,
         )
         self._facts = psutil.Process(self._process.pid)
@@ -153,7 +155,7 @@ def _named(status: int) -> str:
     return signal.Signals(-status).name if status < 0 else f"exit code {status}"
 
 
-def _kill(process: subprocess.Popen[str]) -> None:
+def _kill(process: warm.Program) -> None:
     if sys.platform == "win32":
         process.kill()
         return

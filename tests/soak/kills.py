@@ -12,9 +12,8 @@ from pathlib import Path
 
 import psutil
 import xarray as xr
-from support.campaign_process import workers_of
+from support.campaign_process import BUSY, workers_of
 from support.campaign_scenes import TIMING, frequency_text
-from support.places import TESTS
 
 from vibroimpact.analysis.dataset import read_flat
 
@@ -28,8 +27,6 @@ MOST_COMMANDS = 6
 POINTS = {"independent": 120, "up-down": 60}
 MILLISECONDS = 8.0
 STAMPS = ("history", "date_created", "creation_date")
-
-COMMAND = TESTS / "support" / "busy_command.py"
 
 
 def check(seed: int) -> str | None:
@@ -103,7 +100,7 @@ def _command(scene: str, folder: str, scratch: Path, chance: random.Random | Non
     """Run a campaign and kill processes of it by chance; return its exit code (None: it hung) and what it said."""
     arguments = ["BusyRunner", "campaign", scene, "-o", folder, "--workers", "2"]
     with subprocess.Popen(
-        [sys.executable, str(COMMAND), *arguments],
+        [sys.executable, "-c", BUSY, *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import psutil
+from harness import warm
 
-COMMAND = Path(__file__).with_name("busy_command.py")
+from support.places import TESTS
+
+BUSY = f"import sys; sys.path.insert(0, {str(TESTS)!r}); from support.busy_command import main; main()"
+"""The command line with a point runner from `busy_runner`, which is the first argument."""
 WAIT_SECONDS = 180.0
 """Ten times what a campaign of these tests takes: other tests may keep the processors busy."""
-
-
-def hear_interrupts() -> None:
-    """Undo what a shell does to what it runs in the background: there Ctrl-C is ignored from the start."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def workers_of(command: int) -> list[psutil.Process]:
@@ -60,16 +56,8 @@ class CampaignProcess:
         self, scene: Path, folder: Path, *options: str, runner: str = "BusyRunner", **environment: str
     ) -> None:
         self.folder = folder
-        command = [sys.executable, str(COMMAND), runner, "campaign", str(scene), "-o", str(folder), *options]
-        self.process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-            preexec_fn=hear_interrupts,
-            env=os.environ | environment,
-        )
+        words = (runner, "campaign", scene, "-o", folder, *options)
+        self.process = warm.start(BUSY, *words, start_new_session=True, env=os.environ | environment)
 
     def members(self) -> list[psutil.Process]:
         """Return the living processes of the session."""

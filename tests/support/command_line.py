@@ -6,9 +6,10 @@ import contextlib
 import io
 import os
 import subprocess
-import sys
 from pathlib import Path
 from unittest.mock import patch
+
+from harness import warm
 
 from vibroimpact.orchestrator.commands.cli import main
 
@@ -18,10 +19,7 @@ ENVIRONMENT = {"COLUMNS": "200"}
 
 def vibroimpact(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run the command `vibroimpact` and return its exit code and what it printed."""
-    command = [sys.executable, "-c", ENTRY, *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, timeout=120, env=os.environ | ENVIRONMENT
-    )
+    return warm.run(ENTRY, *arguments, cwd=cwd, env=os.environ | ENVIRONMENT)
 
 
 def in_this_process(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -12,6 +10,7 @@ from types import TracebackType
 
 import numpy as np
 import psutil
+from harness import warm
 from numpy.typing import NDArray
 
 from support.command_line import ENTRY
@@ -77,8 +76,6 @@ SINE = ("--output", "Dev1/ao0", "--frequency", "5.3", "--amplitude", "2", "--ram
 RATE = 10_000.0
 STEEPEST = 2.0 * (2.0 * np.pi * 5.3 + 0.5 * np.pi / 0.05)
 """Of that sine with its ramps, and of the fall from 2 V in 50 ms, V/s: far below the default limit."""
-HEARING = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {ENTRY}"
-"""The program hears Ctrl-C where a shell started the tests in the background, deaf to it, too."""
 SECONDS = 30.0
 """For what should happen at once, on a machine that does other things too."""
 
@@ -88,12 +85,12 @@ class Driven:
 
     Attributes
     ----------
-    program : subprocess.Popen
+    program : subprocess.Popen or warm.Copy
     guardian : psutil.Process
     seen : Observer
     """
 
-    def __init__(self, bench: Bench, seen: Observer, program: subprocess.Popen[str]) -> None:
+    def __init__(self, bench: Bench, seen: Observer, program: warm.Program) -> None:
         self.bench, self.seen, self.program = bench, seen, program
         assert program.stdout is not None
         self.said = program.stdout.readline()
@@ -136,10 +133,8 @@ class Driven:
 def driven(bench: Bench, *more: str) -> Iterator[Driven]:
     """Let the program drive; what is left of it at the end of the block is ended."""
     rig = Rig("bench", bench.channel, bench.server.address)
-    command = [sys.executable, "-u", "-c", HEARING, "rig", "sine", "--rig", f"grpc://{bench.server.address}"]
-    program = subprocess.Popen(
-        [*command, *SINE, *more], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    where = f"grpc://{bench.server.address}"
+    program = warm.start(ENTRY, "rig", "sine", "--rig", where, *SINE, *more)
     guardian: psutil.Process | None = None
     try:
         with Observer(rig, RATE) as seen:

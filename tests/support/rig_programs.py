@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from harness import warm
 
 from support.command_line import ENTRY
 
@@ -17,18 +17,10 @@ PATIENCE = 60.0
 
 
 @contextmanager
-def program(*words: str | Path, cwd: Path) -> Iterator[subprocess.Popen[str]]:
+def program(*words: str | Path, cwd: Path) -> Iterator[warm.Program]:
     """Run a command of `vibroimpact` in a session of its own; kill it where it is still there."""
-    command = [sys.executable, "-u", "-c", ENTRY, *map(str, words)]
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=cwd,
-        env=os.environ | {"COLUMNS": "200"},
-        start_new_session=True,
-    )
+    environment = os.environ | {"COLUMNS": "200"}
+    process = warm.start(ENTRY, *words, cwd=cwd, env=environment, start_new_session=True)
     try:
         yield process
     finally:
@@ -37,7 +29,7 @@ def program(*words: str | Path, cwd: Path) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-def wait_for_bytes(path: Path, count: int, process: subprocess.Popen[str]) -> None:
+def wait_for_bytes(path: Path, count: int, process: warm.Program) -> None:
     """Wait until a file has so many bytes."""
     end = time.monotonic() + PATIENCE
     while not (path.exists() and path.stat().st_size >= count):

@@ -6,11 +6,11 @@ import os
 import re
 import signal
 import socket
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Self
+
+from harness import warm
 
 from support.command_line import ENTRY, ENVIRONMENT
 from vibroimpact.service.client import RemoteJob, Service
@@ -45,6 +45,9 @@ def sweep_text(points: int, transient: int, path: str = "independent") -> str:
 SHORT = sweep_text(40, 50)
 
 
+DASK = "from dask.cli import run_cli; run_cli()"
+
+
 class Served:
     """A service in a process of its own."""
 
@@ -55,12 +58,8 @@ class Served:
 
     def _start(self, *options: str) -> None:
         with self.log.open("ab") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", ENTRY, "serve", "--data", str(self.folder), *options],
-                stdout=subprocess.PIPE,
-                stderr=log,
-                text=True,
-                env=os.environ | ENVIRONMENT,
+            self.process = warm.start(
+                ENTRY, "serve", "--data", self.folder, *options, stderr=log, env=os.environ | ENVIRONMENT
             )
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
@@ -91,18 +90,14 @@ class Cluster:
         with socket.create_server(("127.0.0.1", 0)) as free:
             self._port = free.getsockname()[1]
         self.address = f"tcp://127.0.0.1:{self._port}"
-        self._processes: list[subprocess.Popen[bytes]] = []
+        self._processes: list[warm.Program] = []
 
     def __enter__(self) -> Self:
         where = ("--host", "127.0.0.1", "--port", str(self._port))
         how = ("--nworkers", "1", "--nthreads", "1", "--no-nanny")
         for command in (("scheduler", *where), ("worker", self.address, *how)):
             self._processes.append(
-                subprocess.Popen(
-                    [sys.executable, "-P", "-m", "dask", *command, "--no-dashboard"],
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                )
+                warm.start(DASK, *command, "--no-dashboard", stdout=warm.DEVNULL, stderr=warm.DEVNULL)
             )
         return self
 

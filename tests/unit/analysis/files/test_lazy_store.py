@@ -1,11 +1,10 @@
 from __future__ import annotations
 
 import gc
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
+from harness import warm
 from support.dataset_examples import dataset_of, record
 
 from vibroimpact.analysis import open_dataset
@@ -44,8 +43,7 @@ def test_threads_read_and_write_side_by_side(tmp_path: Path) -> None:
         dataset_of([record(float(value), impacts=1) for value in range(3000)]), tmp_path / "runs.nc"
     )
     # in a process of its own, which such a fault takes with it
-    command = [sys.executable, "-c", THREADS, str(tmp_path / "runs.nc")]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    ended = warm.run(THREADS, tmp_path / "runs.nc")
     assert ended.returncode == 0, ended.stderr[-2000:]
 
 

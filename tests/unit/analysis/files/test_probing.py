@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +11,7 @@ import netCDF4
 import numpy as np
 import psutil
 import pytest
+from harness import warm
 from support.command_line import in_this_process
 from support.dataset_examples import up_down
 
@@ -186,7 +185,7 @@ def test_a_killed_program_leaves_no_process_that_reads(tmp_path: Path, reader: C
         "from vibroimpact.analysis.files import probing\n"
         "probing._CHILD = Path(sys.argv[1]); open_dataset(sys.argv[2])"
     )
-    program = subprocess.Popen([sys.executable, "-c", code, str(probing._CHILD), str(path)])
+    program = warm.start(code, probing._CHILD, path, stdout=None, stderr=None)
     started = Path(f"{path}.reader")
     _wait_until(lambda: started.exists() and started.read_text() != "")
     below = psutil.Process(program.pid).children(recursive=True)
@@ -306,10 +305,8 @@ def test_a_process_made_by_fork_has_a_server_of_its_own(tmp_path: Path) -> None:
     for path in paths:
         with netCDF4.Dataset(path, "w") as file:
             file.title = path.name
-    assert (
-        subprocess.run([sys.executable, "-W", "ignore", "-c", code, *map(str, paths)], timeout=120).returncode
-        == 0
-    )
+    done = warm.run("import warnings; warnings.simplefilter('ignore')\n" + code, *paths)
+    assert done.returncode == 0, done.stderr
 
 
 def test_an_unsound_file_says_what_the_library_raised(tmp_path: Path) -> None:

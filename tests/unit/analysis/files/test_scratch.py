@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import pytest
+from harness import warm
 
 from vibroimpact.analysis.files.folder_lock import locked_folder
 from vibroimpact.analysis.files.scratch import ScratchFolder, sweep
@@ -34,8 +34,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_is_not(temporary: Path) -> None:
-    command = [sys.executable, "-c", OWNER, "wait"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as owner:
+    with warm.start(OWNER, "wait") as owner:
         assert owner.stdout is not None
         folder = Path(owner.stdout.readline().strip())
         (folder / "data").write_text("of a living process")
@@ -50,7 +49,8 @@ def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_is_not
 
 @pytest.mark.slow
 def test_a_process_that_ends_leaves_no_folder(temporary: Path) -> None:
-    done = subprocess.run([sys.executable, "-c", OWNER, "end"], capture_output=True, text=True, check=True)
+    done = warm.run(OWNER, "end")
+    assert done.returncode == 0, done.stderr
     assert str(temporary) in done.stdout
     assert not os.listdir(temporary)
 
@@ -85,10 +85,7 @@ def test_a_sweep_leaves_folders_of_other_users(temporary: Path) -> None:
 def test_folders_of_many_processes_that_start_and_die_at_once_do_not_disturb_each_other(
     temporary: Path,
 ) -> None:
-    owners = [
-        subprocess.Popen([sys.executable, "-c", OWNER, "wait"], stdout=subprocess.PIPE, text=True)
-        for _ in range(4)
-    ]
+    owners = [warm.start(OWNER, "wait") for _ in range(4)]
     folders = [Path(owner.stdout.readline().strip()) for owner in owners if owner.stdout]
     assert len(set(folders)) == 4
     owners[0].send_signal(signal.SIGTERM)

@@ -2,13 +2,12 @@
 
 import os
 import stat
-import subprocess
-import sys
 import zipfile
 import zlib
 from pathlib import Path
 
 import pytest
+from harness import warm
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging import archive, zip_members
@@ -85,7 +84,7 @@ def test_many_processes_may_unpack_the_same_fmu_at_once(tmp_path: Path, cache: P
         "import sys; from pathlib import Path; from vibroimpact.fmus.packaging.archive import *; "
         "assert binary_path(unpack(Path(sys.argv[1]))).stat().st_size == 3_000_000"
     )
-    running = [subprocess.Popen([sys.executable, "-c", code, str(path)]) for _ in range(6)]
+    running = [warm.start(code, path, stdout=None, stderr=None) for _ in range(6)]
     assert [process.wait() for process in running] == [0] * 6
     assert len(unpacked_folders(cache)) == 1
 
@@ -106,7 +105,7 @@ def test_another_process_does_not_believe_the_cache_either(tmp_path: Path) -> No
         "import sys; from pathlib import Path; from vibroimpact.fmus.packaging.archive import binary_path, unpack\n"
         "assert binary_path(unpack(Path(sys.argv[1]))).read_bytes() == b'code'"
     )
-    assert subprocess.run([sys.executable, "-c", code, str(fmu.source)]).returncode == 0
+    assert warm.run(code, fmu.source).returncode == 0
 
 
 def test_a_link_in_the_place_of_a_library_is_not_followed(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Component
 from fmpy.fmi3 import FMU3Slave
+from harness import warm
 from support import fmu_factory
 
 from vibroimpact.fmus.packaging.check import check_fmu
@@ -200,14 +201,12 @@ def test_the_gain_answers_at_once_and_saves_no_state(tmp_path: Path) -> None:
     gain.freeInstance()
 
 
-def driver(tmp_path: Path, fmi: str, fault: str, steps: int = 5) -> list[str]:
-    path = fmu_factory.faulty(tmp_path, fmi)
-    return [sys.executable, "-c", DRIVER, str(path), str(tmp_path / "faulty"), fault, str(steps)]
+def driver(tmp_path: Path, fmi: str, fault: str, steps: int = 5) -> list[str | Path]:
+    return [DRIVER, fmu_factory.faulty(tmp_path, fmi), tmp_path / "faulty", fault, str(steps)]
 
 
 def drive(tmp_path: Path, fmi: str, fault: str, steps: int = 5) -> subprocess.CompletedProcess[str]:
-    command = driver(tmp_path, fmi, fault, steps)
-    return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+    return warm.run(*driver(tmp_path, fmi, fault, steps))
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
@@ -246,7 +245,7 @@ def test_a_crash_ends_the_process_in_the_fourth_step(
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_a_hang_never_comes_back(tmp_path: Path, fmi: str) -> None:
-    with subprocess.Popen(driver(tmp_path, fmi, "hang"), stdout=subprocess.PIPE, text=True) as process:
+    with warm.start(*driver(tmp_path, fmi, "hang")) as process:
         assert process.stdout is not None
         printed = list(iter(process.stdout.readline, "step 3\n"))
         assert sum(line.startswith("answer") for line in printed) == 3

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from harness import warm
 from support.command_line import ENTRY, in_this_process
 from support.places import ROOT
 
@@ -23,8 +22,8 @@ BEAM = ROOT / "examples" / "rig" / "beam.toml"
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    command = [sys.executable, "-u", "-c", ENTRY, "rig", "serve", str(RIG), "--port", "0", "--speed", "20"]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    words = ("rig", "serve", RIG, "--port", "0", "--speed", "20")
+    server = warm.start(ENTRY, *words, stderr=warm.DEVNULL)
     assert server.stdout is not None
     said = server.stdout.readline()
     assert said.startswith("Dev1, X Series (virtual), at grpc://127.0.0.1:")

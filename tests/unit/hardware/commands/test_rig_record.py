@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from harness import warm
 from support.command_line import ENTRY, in_this_process
 from support.places import ROOT
 from support.rig_programs import PATIENCE, program, wait_for_bytes
@@ -28,8 +27,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     """Serve a rig whose output is at 1 V, so that a recording is not all zeros."""
-    command = [sys.executable, "-u", "-c", ENTRY, "rig", "serve", str(RIG), "--port", "0"]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    server = warm.start(ENTRY, "rig", "serve", RIG, "--port", "0", stderr=warm.DEVNULL)
     assert server.stdout is not None
     found = server.stdout.readline().split("grpc://")[1].split(",")[0]
     with open_channel(found) as channel:
@@ -122,14 +120,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of the size of files")
 def test_a_disk_that_takes_no_more_is_said_and_what_is_there_is_kept(address: str, tmp_path: Path) -> None:
     limit = FULL.format(limit=400_000)
-    done = subprocess.run(
-        [sys.executable, "-c", limit + ENTRY, *words(address, "-o", "tip.nc", "--duration", "60")],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        timeout=PATIENCE,
-        env=os.environ,
-    )
+    done = warm.run(limit + ENTRY, *words(address, "-o", "tip.nc", "--duration", "60"), cwd=tmp_path)
     assert done.returncode == 1, done.stderr
     assert "ended early: the journal cannot be written: File too large" in done.stderr
     # zeros and ones are compressed well, so that the recording fits
@@ -147,14 +138,7 @@ def test_a_recording_that_cannot_be_written_is_still_in_its_journal(address: str
         "    write(*given)\n"
         "m.write_and_show = full\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", limit + ENTRY, *words(address, "-o", "tip.nc", "--duration", "1")],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        timeout=PATIENCE,
-        env=os.environ,
-    )
+    done = warm.run(limit + ENTRY, *words(address, "-o", "tip.nc", "--duration", "1"), cwd=tmp_path)
     assert done.returncode == 2
     assert "tip.nc: could not be written: File too large." in done.stderr
     assert "vibroimpact rig recover tip.journal -o FILE.nc" in done.stderr

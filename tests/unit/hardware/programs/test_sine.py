@@ -8,13 +8,13 @@ from __future__ import annotations
 import inspect
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
 
 import psutil
 import pytest
+from harness import warm
 from support.command_line import ENTRY, in_this_process
 from support.driving import SECONDS, SINE, STEEPEST, driven
 from support.places import ROOT
@@ -206,9 +206,8 @@ def test_more_signals_do_not_hurry_it(live: Bench) -> None:
 
 
 @pytest.fixture
-def server() -> Iterator[tuple[subprocess.Popen[str], str]]:
-    command = [sys.executable, "-u", "-c", ENTRY, "rig", "serve", str(RIG), "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+def server() -> Iterator[tuple[warm.Program, str]]:
+    with warm.start(ENTRY, "rig", "serve", RIG, "--port", "0", stderr=warm.DEVNULL) as process:
         assert process.stdout is not None
         yield process, process.stdout.readline().split("grpc://")[1].split(",")[0]
         process.kill()
@@ -216,11 +215,11 @@ def server() -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 @pytest.mark.parametrize("program_too", [True, False])
 def test_where_the_server_has_gone_nothing_is_claimed_of_the_output(
-    server: tuple[subprocess.Popen[str], str], program_too: bool
+    server: tuple[warm.Program, str], program_too: bool
 ) -> None:
     process, address = server
-    command = [sys.executable, "-u", "-c", ENTRY, "rig", "sine", "--rig", f"grpc://{address}", *SINE]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+    words = ("rig", "sine", "--rig", f"grpc://{address}", *SINE)
+    with warm.start(ENTRY, *words) as program:
         assert program.stdout is not None
         program.stdout.readline()
         (guardian,) = psutil.Process(program.pid).children()
@@ -238,8 +237,8 @@ def test_where_the_server_has_gone_nothing_is_claimed_of_the_output(
 
 
 def test_a_virtual_rig_of_its_own_goes_with_the_program() -> None:
-    command = [sys.executable, "-u", "-c", ENTRY, "rig", "sine", "--rig", f"virtual:{RIG}", *SINE]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+    words = ("rig", "sine", "--rig", f"virtual:{RIG}", *SINE)
+    with warm.start(ENTRY, *words) as program:
         assert program.stdout is not None
         assert "virtual:oscillator.toml" in program.stdout.readline()
         (guardian,) = psutil.Process(program.pid).children()
@@ -266,8 +265,7 @@ with opened_rig("grpc://" + sys.argv[1]) as rig:
 @pytest.mark.parametrize("hanging", [False, True])
 def test_where_nobody_can_attach_the_guardian_waits_for_the_device(live: Bench, hanging: bool) -> None:
     # as with a driver in the program; the end of the task, which the driver does there, the test does here
-    command = [sys.executable, "-c", WITHOUT_ATTACHING, live.server.address]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+    with warm.start(WITHOUT_ATTACHING, live.server.address) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "driving\n"
         (guardian,) = psutil.Process(program.pid).children()
@@ -287,8 +285,7 @@ def test_where_nobody_can_attach_the_guardian_waits_for_the_device(live: Bench, 
 
 
 def test_a_device_that_is_not_freed_is_said(live: Bench) -> None:
-    command = [sys.executable, "-c", WITHOUT_ATTACHING, live.server.address]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+    with warm.start(WITHOUT_ATTACHING, live.server.address) as program:
         assert program.stdout is not None
         program.stdout.readline()
         program.kill()

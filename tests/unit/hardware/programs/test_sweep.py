@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shutil
 import signal
-import subprocess
-import sys
 import time
 import tomllib
 from collections.abc import Iterator
@@ -15,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from harness import warm
 from support.command_line import ENTRY, in_this_process
 from support.places import ROOT
 from support.rig_bench import Bench, opened_bench
@@ -358,23 +357,11 @@ class started:  # reads as a sentence
 
     def __init__(self, bench: Bench, home: Path, folder: Path) -> None:
         (home / "sweep.toml").write_text(TEXT)
-        rig = ["--rig", f"grpc://{bench.server.address}"]
-        self._command = [
-            sys.executable,
-            "-c",
-            ENTRY,
-            "rig",
-            "sweep",
-            str(home / "sweep.toml"),
-            "-o",
-            str(folder),
-            *rig,
-        ]
+        rig = ("--rig", f"grpc://{bench.server.address}")
+        self._words = ("rig", "sweep", home / "sweep.toml", "-o", folder, *rig)
 
-    def __enter__(self) -> subprocess.Popen[str]:
-        self._process = subprocess.Popen(
-            self._command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
+    def __enter__(self) -> warm.Program:
+        self._process = warm.start(ENTRY, *self._words, stdout=warm.DEVNULL)
         return self._process
 
     def __exit__(self, *error: object) -> None:
@@ -385,7 +372,7 @@ class started:  # reads as a sentence
         self._process.stderr.close()
 
 
-def wait_for_steps(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
+def wait_for_steps(folder: Path, count: int, process: warm.Program) -> None:
     """Wait until so many steps are stored."""
     end = time.monotonic() + 90.0
     while time.monotonic() < end:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from harness import warm
 from hypothesis import given
 from hypothesis import strategies as st
 from support.places import ROOT
@@ -102,8 +101,7 @@ task.read(10**6, timeout=-1)
 
 def test_a_client_that_is_killed_in_the_middle_of_a_read_leaves_a_task_that_others_can_end() -> None:
     with opened_bench(RIG, lockstep=False) as bench:
-        command = [sys.executable, "-c", DYING, bench.server.address]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as client:
+        with warm.start(DYING, bench.server.address) as client:
             assert client.stdout is not None
             assert client.stdout.readline() == "reads\n"
             client.kill()

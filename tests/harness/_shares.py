@@ -1,0 +1,55 @@
+"""Shares of the tests: modules stay together where that costs no time, the dearest begin first."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+
+class Shares:
+    """Hands out numbers of tests to workers.
+
+    A worker follows one module to its end, so that fixtures of modules are made once, and then takes the dearest module
+    that nobody has begun. Where none is left it takes the second half of what the busiest worker still has.
+
+    Parameters
+    ----------
+    modules : sequence of str
+        The module of each test, in the order of collection.
+    seconds : mapping of str to float
+        Wall time of a module, s, as far as it is known; others count as nothing.
+    workers : int
+    """
+
+    def __init__(self, modules: Sequence[str], seconds: Mapping[str, float], workers: int) -> None:
+        groups: dict[str, deque[int]] = {}
+        for number, module in enumerate(modules):
+            groups.setdefault(module, deque()).append(number)
+        self._each = {
+            number: seconds.get(module, 0.0) / len(group)
+            for module, group in groups.items()
+            for number in group
+        }
+        self._waiting = deque(sorted(groups.values(), key=self._left, reverse=True))
+        self._begun: list[deque[int]] = [deque() for _ in range(workers)]
+
+    def _left(self, group: deque[int]) -> float:
+        return sum(self._each[number] for number in group)
+
+    def next(self, worker: int) -> int | None:
+        """Return the test that a worker runs next; None if nothing is left for it."""
+        own = self._begun[worker]
+        if not own and self._waiting:
+            own.extend(self._waiting.popleft())
+        if not own:
+            self._take_over(own)
+        return own.popleft() if own else None
+
+    def _take_over(self, own: deque[int]) -> None:
+        busiest = max(self._begun, key=lambda group: (self._left(group), len(group)))
+        for _ in range((len(busiest) + 1) // 2):
+            own.appendleft(busiest.pop())
+
+    def give_back(self, worker: int, number: int) -> None:
+        """Take back a test that a worker has not begun."""
+        self._begun[worker].appendleft(number)

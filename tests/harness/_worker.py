@@ -1,0 +1,95 @@
+"""A forked copy of the process that has collected: it runs the tests that it is given and tells what came of them."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+import traceback
+import warnings
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+
+class _Told:
+    """The plugin that passes on what the terminal would show."""
+
+    def __init__(self, config: pytest.Config, link: Connection) -> None:
+        self._config, self._link = config, link
+
+    def pytest_runtest_logstart(self, nodeid: str, location: tuple[str, int | None, str]) -> None:
+        self._link.send(("start", {"nodeid": nodeid, "location": location}))
+
+    def pytest_runtest_logfinish(self, nodeid: str, location: tuple[str, int | None, str]) -> None:
+        self._link.send(("finish", {"nodeid": nodeid, "location": location}))
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
+        self._link.send(("report", data))
+
+    def pytest_warning_recorded(
+        self,
+        warning_message: warnings.WarningMessage,
+        when: str,
+        nodeid: str,
+        location: tuple[str, int, str] | None,
+    ) -> None:
+        if when != "runtest":
+            return  # of the time before the fork
+        # its class may be one that cannot be sent
+        told = f"{warning_message.category.__name__}: {warning_message.message}"
+        plain = warnings.WarningMessage(
+            UserWarning(told), UserWarning, warning_message.filename, warning_message.lineno
+        )
+        given = {"warning_message": plain, "when": when, "nodeid": nodeid, "location": location}
+        self._link.send(("warning", given))
+
+
+def run_share(session: pytest.Session, link: Connection, folder: Path) -> NoReturn:
+    """Run tests until no number of one comes; then end this process, and nothing that its parent has begun."""
+    code = 1
+    try:
+        _become_a_worker(session.config, link, folder)
+        try:
+            _run(session, link)
+        finally:
+            session._setupstate.teardown_exact(None)
+        merged: dict[str, Any] = {}
+        for part in session.config.hook.pytest_handed_over(config=session.config):
+            merged |= part
+        link.send(("end", merged))
+        code = 0
+    except (KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
+        code = 130  # the process that collected has heard it too, or has ended
+    except BaseException:
+        traceback.print_exc(file=sys.__stderr__)
+    finally:
+        os._exit(code)
+
+
+def _become_a_worker(config: pytest.Config, link: Connection, folder: Path) -> None:
+    gc.freeze()
+    plugins: Any = config.pluginmanager
+    plugins.unregister(name="terminalreporter")
+    plugins.register(_Told(config, link))
+    capture = plugins.getplugin("capturemanager")
+    # the files into which output is captured are those of all copies
+    capture.stop_global_capturing()
+    capture.start_global_capturing()
+    capture.suspend_global_capture()
+    folder.mkdir(exist_ok=True)
+    config._tmp_path_factory._basetemp = folder  # type: ignore[attr-defined]
+
+
+def _run(session: pytest.Session, link: Connection) -> None:
+    number = link.recv()
+    while number is not None:
+        link.send(("begun", number))
+        following = link.recv()
+        nextitem = None if following is None else session.items[following]
+        item = session.items[number]
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
+        number = following

@@ -1,0 +1,151 @@
+"""`--budget`: the processor time of all tests, against a kept figure; the dearest tests are listed.
+
+Processor time of a machine that does other things too varies with it. So it is counted in yardsticks: a fixed piece of
+Python and C, which each worker runs now and then.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+import tomllib
+import zlib
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness import warm
+
+KEPT = Path(__file__).with_name("budget.toml")
+SECONDS = Path(__file__).with_name("module_seconds.json")
+"""Wall time of each test module, s, of a run with `--keep-seconds`: what `--side-by-side` orders modules by."""
+DEAREST = 20
+MAY_GROW = 0.1
+"""Share of the kept figure by which processor time may grow."""
+EVERY = 20.0
+"""Wall time between two yardsticks of a worker, s."""
+
+
+def seconds_of_modules() -> dict[str, float]:
+    """Return the wall time of each test module, s, as it is kept."""
+    return dict(json.loads(SECONDS.read_text())) if SECONDS.exists() else {}
+
+
+def processor_time() -> float:
+    """Return the processor time of this process and of its children that have ended, s."""
+    import resource  # not on Windows
+
+    each = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in each)
+
+
+def yardstick() -> float:
+    """Return the processor time of a fixed piece of Python and C, s."""
+    began = time.process_time()
+    numbers = [number * number % 1009 for number in range(40_000)]
+    counted = Counter(numbers)
+    packed = zlib.compress(",".join(map(str, numbers)).encode(), 9)
+    assert len(counted) == 505
+    assert zlib.decompress(packed).startswith(b"0,1,4,9,")
+    return time.process_time() - began
+
+
+class Costs:
+    """What the tests of this process have cost, and those of its copies when they have ended."""
+
+    def __init__(self) -> None:
+        self.tests: dict[str, float] = {}
+        self.modules: Counter[str] = Counter()
+        self.yardsticks = [yardstick()]
+        self._measured = time.monotonic()
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
+        """Measure the processor time of a test, its fixtures and the processes that it started and that have ended."""
+        before = processor_time() + warm.seconds_used()
+        try:
+            return (yield)
+        finally:
+            self.tests[item.nodeid] = processor_time() + warm.seconds_used() - before
+            if time.monotonic() - self._measured > EVERY:
+                self.yardsticks.append(yardstick())
+                self._measured = time.monotonic()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self.modules[report.nodeid.partition("::")[0]] += report.duration
+
+    def pytest_handed_over(self) -> dict[str, Any]:
+        return {"costs": (self.tests, self.yardsticks)}
+
+    def pytest_taken_over(self, given: dict[str, Any]) -> None:
+        tests, yardsticks = given["costs"]
+        self.tests |= tests
+        self.yardsticks += yardsticks
+
+
+COSTS = pytest.StashKey[Costs]()
+TOTAL = pytest.StashKey[tuple[float, float]]()
+"""Processor time of the whole session, s, and the same in yardsticks."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    text = "end in an error where the processor time of all tests is above the kept figure; list the dearest"
+    parser.addoption("--budget", action="store_true", help=text)
+    parser.addoption(
+        "--keep-seconds", action="store_true", help=f"write {SECONDS.name}, the order of modules"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("budget") or config.getoption("keep_seconds"):
+        config.stash[COSTS] = Costs()
+        config.pluginmanager.register(config.stash[COSTS])
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    config = session.config
+    if COSTS not in config.stash:
+        return
+    # now its children have been waited for, too
+    warm.end_server()
+    costs, seconds = config.stash[COSTS], processor_time()
+    costs.yardsticks.append(yardstick())
+    config.stash[TOTAL] = seconds, seconds / statistics.mean(costs.yardsticks)
+    if config.getoption("keep_seconds"):
+        kept = {module: round(took, 1) for module, took in sorted(costs.modules.items()) if took >= 0.1}
+        SECONDS.write_text(json.dumps(kept, indent=0) + "\n", encoding="ascii")
+    if config.getoption("budget") and session.exitstatus == pytest.ExitCode.OK and _excess(config) > MAY_GROW:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def kept_yardsticks() -> float:
+    """Return the processor time that is kept for all tests, in yardsticks."""
+    return float(tomllib.loads(KEPT.read_text(encoding="utf-8"))["yardsticks"])
+
+
+def _excess(config: pytest.Config) -> float:
+    return config.stash[TOTAL][1] / kept_yardsticks() - 1.0
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Write the dearest tests and the sum."""
+    if TOTAL not in config.stash:
+        return
+    costs, (seconds, yardsticks) = config.stash[COSTS], config.stash[TOTAL]
+    terminalreporter.section(f"processor time: the {DEAREST} dearest tests")
+    for name, took in sorted(costs.tests.items(), key=lambda item: -item[1])[:DEAREST]:
+        terminalreporter.line(f"{took:7.1f} s  {name}")
+    each = statistics.mean(costs.yardsticks)
+    terminalreporter.line(
+        f"All tests and their processes took {seconds:.0f} s, {yardsticks:.0f} yardsticks of {each * 1e3:.1f} ms."
+    )
+    if config.getoption("budget") and (excess := _excess(config)) > MAY_GROW:
+        terminalreporter.line(
+            f"ERROR: this is {excess:.0%} above the {kept_yardsticks():.0f} that tests/harness/{KEPT.name} keeps; "
+            f"expected at most {MAY_GROW:.0%}. Make tests cheaper, or raise the figure and say why beside it.",
+            red=True,
+        )

@@ -1,0 +1,177 @@
+"""`--side-by-side N`: the tests are collected once, and N forked copies of this process run them.
+
+Each copy has what collection has imported, and shares its memory. A copy that dies fails the test that it ran, and
+another one goes on. Where a process cannot be forked, the tests run one after the other.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from multiprocessing.connection import Connection, Pipe, wait
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness import costs, warm
+from harness._shares import Shares
+from harness._worker import run_share
+from vibroimpact.fmus.python_child import ending
+
+FORKS = sys.platform == "linux"
+"""Elsewhere libraries of the system do not survive a fork, or there is none."""
+
+
+class Hooks:
+    """What a worker and the process that collected tell each other of their plugins."""
+
+    @pytest.hookspec
+    def pytest_handed_over(self, config: pytest.Config) -> dict[str, Any]:
+        """Return what a worker's plugin knows when its last test has ended."""
+        raise NotImplementedError
+
+    @pytest.hookspec
+    def pytest_taken_over(self, config: pytest.Config, given: dict[str, Any]) -> None:
+        """Take what the plugins of a worker have handed over, all in one."""
+
+
+def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
+    pluginmanager.add_hookspecs(Hooks)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    text = "run the tests in so many forked copies of this process, where it can be forked"
+    parser.addoption("--side-by-side", type=int, default=0, metavar="N", help=text)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    if _is_wanted(session.config):
+        warm.start_server()
+
+
+def _is_wanted(config: pytest.Config) -> bool:
+    option = config.option
+    return FORKS and option.side_by_side > 0 and not (option.collectonly or option.usepdb)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> bool | None:
+    if not _is_wanted(session.config) or not session.items or session.testsfailed:
+        return None
+    warm.refuse_threads()
+    warm.wait_for_server()
+    with _Workers(session) as workers:
+        workers.run()
+    return True
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    warm.end_server()
+
+
+class _Workers:
+    """The forked processes of a session, and what each of them is doing."""
+
+    def __init__(self, session: pytest.Session) -> None:
+        count = min(session.config.option.side_by_side, len(session.items))
+        modules = [item.nodeid.partition("::")[0] for item in session.items]
+        self._session = session
+        self._shares = Shares(modules, costs.seconds_of_modules(), count)
+        self._links: list[Connection | None] = [None] * count
+        self._pids = [0] * count
+        self._running: list[int | None] = [None] * count
+        self._following: list[int | None] = [None] * count
+        # the workers' own temporary folders lie in it
+        self._folder: Path = session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
+
+    def __enter__(self) -> _Workers:
+        for worker in range(len(self._pids)):
+            self._start(worker)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for link in filter(None, self._links):
+            link.close()
+        for pid in filter(None, self._pids):
+            os.waitpid(pid, 0)
+
+    def _start(self, worker: int) -> None:
+        here, there = Pipe()
+        sys.stdout.flush()
+        pid = os.fork()
+        if not pid:
+            for link in (here, *filter(None, self._links)):
+                link.close()
+            run_share(self._session, there, self._folder / f"worker{worker}")
+        there.close()
+        self._links[worker], self._pids[worker] = here, pid
+        self._running[worker] = None
+        self._following[worker] = self._shares.next(worker)
+        here.send(self._following[worker])
+
+    def run(self) -> None:
+        """Hand out the tests and pass on what comes back, until all have run or the session is to end."""
+        while living := {link: worker for worker, link in enumerate(self._links) if link is not None}:
+            for link in wait(list(living)):
+                assert isinstance(link, Connection)
+                try:
+                    kind, given = link.recv()
+                except EOFError:
+                    self._ended(living[link])
+                else:
+                    getattr(self, f"_take_{kind}")(living[link], given)
+            if self._session.shouldfail:
+                raise self._session.Failed(self._session.shouldfail)
+            if self._session.shouldstop:
+                raise self._session.Interrupted(self._session.shouldstop)
+
+    def _take_begun(self, worker: int, number: int) -> None:
+        link = self._links[worker]
+        assert link is not None
+        self._running[worker] = number
+        self._following[worker] = self._shares.next(worker)
+        link.send(self._following[worker])
+
+    def _take_start(self, worker: int, given: dict[str, Any]) -> None:
+        self._session.config.hook.pytest_runtest_logstart(**given)
+
+    def _take_finish(self, worker: int, given: dict[str, Any]) -> None:
+        self._session.config.hook.pytest_runtest_logfinish(**given)
+
+    def _take_report(self, worker: int, given: dict[str, Any]) -> None:
+        config = self._session.config
+        report = config.hook.pytest_report_from_serializable(config=config, data=given)
+        config.hook.pytest_runtest_logreport(report=report)
+
+    def _take_warning(self, worker: int, given: dict[str, Any]) -> None:
+        self._session.config.hook.pytest_warning_recorded.call_historic(kwargs=given)
+
+    def _take_end(self, worker: int, given: dict[str, Any]) -> None:
+        self._session.config.hook.pytest_taken_over(config=self._session.config, given=given)
+        self._running[worker] = None
+
+    def _ended(self, worker: int) -> None:
+        """Wait for a worker whose link is closed; where a test ended it, fail the test and start another worker."""
+        link, number = self._links[worker], self._running[worker]
+        assert link is not None
+        link.close()
+        _, status = os.waitpid(self._pids[worker], 0)
+        self._links[worker], self._pids[worker] = None, 0
+        if number is None and self._following[worker] is None:
+            return
+        if number is not None:
+            self._fail(self._session.items[number], ending(os.waitstatus_to_exitcode(status)))
+        if (following := self._following[worker]) is not None:
+            self._shares.give_back(worker, following)
+            self._start(worker)
+
+    def _fail(self, item: pytest.Item, told: str) -> None:
+        words = f"{item.nodeid}: the worker that ran it {told}."
+        hook = self._session.config.hook
+        where = {"nodeid": item.nodeid, "location": item.location}
+        report = pytest.TestReport(
+            **where, keywords={}, outcome="failed", longrepr=words, when="call", sections=[], duration=0.0
+        )
+        hook.pytest_runtest_logreport(report=report)
+        hook.pytest_runtest_logfinish(**where)

@@ -1,0 +1,267 @@
+"""Python programs that tests start: copies of a warm process where there is one, which saves the imports.
+
+A test of what is imported, of memory, of variables that are read at imports or of the start itself starts cold.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, TypeAlias
+
+PROGRAM = "from harness.warm_server import main; main()"
+TESTS = Path(__file__).resolve().parents[1]
+
+DEVNULL = subprocess.DEVNULL
+WITHOUT_THREADS = {"OPENBLAS_NUM_THREADS": "1", "JE_ARROW_MALLOC_CONF": "background_thread:false"}
+"""Variables that keep numpy and pyarrow from starting threads, which a fork loses, when they are imported."""
+
+_server: tuple[subprocess.Popen[str], tempfile.TemporaryDirectory[str]] | None = None
+_seconds = 0.0
+_lock = threading.Lock()
+
+
+def refuse_threads() -> None:
+    """Raise AssertionError where this process has a thread beside this one, of Python or of a library."""
+    threads = [Path(f"/proc/self/task/{number}/comm").read_text() for number in os.listdir("/proc/self/task")]
+    assert len(threads) == 1, f"expected one thread before a fork, got {threads}"
+
+
+def start_server() -> None:
+    """Start the warm process, which imports while the caller goes on; copies of the caller use it too."""
+    global _server
+    folder = tempfile.TemporaryDirectory(prefix="warm-")
+    path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-c", PROGRAM, str(Path(folder.name, "socket"))],
+        env=os.environ | WITHOUT_THREADS | {"PYTHONPATH": path},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    _server = process, folder
+    atexit.register(end_server)
+
+
+def wait_for_server() -> None:
+    """Wait until the warm process has imported all, if there is one."""
+    if _server is not None:
+        assert _server[0].stdout is not None
+        assert _server[0].stdout.readline() == "ready\n", "the warm process for commands did not start"
+
+
+def end_server() -> None:
+    """End the warm process, if there is one."""
+    global _server
+    if _server is not None:
+        process, folder = _server
+        _server = None
+        process.communicate()
+        folder.cleanup()
+
+
+def seconds_used() -> float:
+    """Return the processor time of all copies that this process has started and that have ended, s."""
+    return _seconds
+
+
+def start(
+    program: str,
+    *arguments: str | Path,
+    cwd: Path | None = None,
+    env: Mapping[str, str] | None = None,
+    stdin: int | None = subprocess.DEVNULL,
+    stdout: int | IO[Any] | None = subprocess.PIPE,
+    stderr: int | IO[Any] | None = subprocess.PIPE,
+    start_new_session: bool = False,
+    cold: bool = False,
+) -> Program:
+    """Start `python -u -c PROGRAM ARGUMENTS...`; what comes back is used as `subprocess.Popen` is, in text.
+
+    Parameters
+    ----------
+    program : str
+        Python, run as `__main__`.
+    arguments : str or Path
+    cwd : Path, optional
+    env : mapping, optional
+        The whole environment; that of this process by default.
+    stdin, stdout, stderr : int or file
+        As `subprocess.Popen` takes them.
+    start_new_session : bool
+        Else it has a process group of its own alone.
+    cold : bool
+        Start Python anew.
+    """
+    words = [*map(str, arguments)]
+    if _server is not None and not cold:
+        return Copy(program, words, cwd, env, (stdin, stdout, stderr), start_new_session)
+    return subprocess.Popen(
+        [sys.executable, "-u", "-c", program, *words],
+        cwd=cwd,
+        env=None if env is None else dict(env),
+        stdin=stdin,
+        stdout=stdout,
+        stderr=stderr,
+        text=True,
+        start_new_session=start_new_session,
+        process_group=None if start_new_session or os.name != "posix" else 0,
+    )
+
+
+def run(
+    program: str, *arguments: str | Path, timeout: float = 120.0, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end; return its exit code and what it wrote."""
+    with start(program, *arguments, **options) as process:
+        try:
+            out, err = process.communicate(timeout=timeout)
+        except BaseException:
+            process.kill()
+            raise
+    return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, out, err)
+
+
+class Copy:
+    """A copy of the warm process that runs a program: the part of `subprocess.Popen` that tests use.
+
+    Attributes
+    ----------
+    pid : int
+    returncode : int or None
+    stdin, stdout, stderr : file or None
+        This end of a pipe.
+    """
+
+    def __init__(
+        self,
+        program: str,
+        arguments: list[str],
+        cwd: Path | None,
+        env: Mapping[str, str] | None,
+        streams: tuple[int | IO[Any] | None, ...],
+        start_new_session: bool,
+    ) -> None:
+        assert _server is not None
+        self.returncode: int | None = None
+        self.args = arguments
+        asked = {
+            "program": program,
+            "arguments": arguments,
+            "folder": os.fspath(cwd or Path.cwd()),
+            "environment": dict(os.environ if env is None else env),
+            "session": start_new_session,
+        }
+        with contextlib.ExitStack() as stack:
+            ends = [_ends(number, stream, stack) for number, stream in enumerate(streams)]
+            (self.stdin, given), (self.stdout, out), (self.stderr, err) = ends
+            self._connection = socket.socket(socket.AF_UNIX)
+            self._connection.connect(str(Path(_server[1].name, "socket")))
+            data = json.dumps(asked).encode() + b"\n"
+            sent = socket.send_fds(self._connection, [data], [given, out, err])
+            self._connection.sendall(data[sent:])
+            self._answers = self._connection.makefile()
+            self.pid = int(self._answers.readline())
+
+    def poll(self) -> int | None:
+        """Return how it has ended; None while it runs."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0.0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end; return the exit code, or that of the signal with a minus."""
+        global _seconds
+        with _lock:
+            if self.returncode is None:
+                self._connection.settimeout(timeout or None if timeout != 0.0 else 0.0)
+                try:
+                    ready = self._connection.recv(1, socket.MSG_PEEK)
+                except (TimeoutError, BlockingIOError):
+                    raise subprocess.TimeoutExpired(self.args, timeout or 0.0) from None
+                assert ready, "the warm process for commands has ended"
+                self._connection.settimeout(None)
+                told = json.loads(self._answers.readline())
+                self._connection.close()
+                self.returncode = int(told["code"])
+                _seconds += told["seconds"]
+        return self.returncode
+
+    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
+        """Return all that it writes, when it has ended."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        streams = [stream for stream in (self.stdout, self.stderr) if stream and not stream.closed]
+        told = {stream: "" for stream in streams}
+
+        def read(stream: IO[str]) -> None:
+            told[stream] = stream.read()
+
+        readers = [threading.Thread(target=read, args=[stream], daemon=True) for stream in streams]
+        for reader in readers:
+            reader.start()
+        for reader in readers:
+            reader.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
+            if reader.is_alive():
+                raise subprocess.TimeoutExpired(self.args, timeout or 0.0)
+        self.wait(None if deadline is None else max(0.001, deadline - time.monotonic()))
+        for stream in streams:
+            stream.close()
+        return told.get(self.stdout, ""), told.get(self.stderr, "")
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.send_signal(signal.SIGKILL)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def __enter__(self) -> Copy:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for stream in (self.stdout, self.stderr, self.stdin):
+            if stream is not None:
+                stream.close()
+        self.wait()
+
+
+def _ends(
+    number: int, asked: int | IO[Any] | None, stack: contextlib.ExitStack
+) -> tuple[IO[str] | None, int]:
+    """Return this end of a standard stream, if it is a pipe, and the file descriptor of the other end."""
+    mode = "r" if number else "w"
+    if asked == subprocess.PIPE:
+        pipe = os.pipe()
+        mine, theirs = pipe if number else reversed(pipe)
+        stack.callback(os.close, theirs)
+        return open(mine, mode), theirs
+    if asked == subprocess.DEVNULL:
+        return None, stack.enter_context(open(os.devnull, "r+")).fileno()
+    if asked is None:
+        return None, number
+    return None, asked if isinstance(asked, int) else asked.fileno()
+
+
+Program: TypeAlias = subprocess.Popen[str] | Copy
+"""A program that runs, however it was started."""
