@@ -17,7 +17,7 @@ NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' 
 # tests side by side: one more than there are cores, as many wait for processes of their own, and four at most for they
 # use cores as well; `make test PARALLEL=` runs them one by one
 WORKERS = $(shell $(PYTHON) -c 'import os; print(min(4, (os.cpu_count() or 1) + 1))')
-PARALLEL ?= -n $(WORKERS) --dist worksteal
+PARALLEL ?= --side-by-side $(WORKERS)
 SETUP := pyproject.toml hatch_build.py
 # pip says what it does: it takes minutes, and silence looks like a stall
 INSTALL = $(BIN)/python -m pip install --disable-pip-version-check
@@ -36,9 +36,8 @@ demo: $(VENV)/demo.stamp $(VENV)/fmus.stamp ## run the demonstration campaign; l
 fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the quick tests of every room, in some minutes; says what it left out
 	$(BIN)/python -m pytest -q --fast $(PARALLEL)
 
-test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but benchmarks and long series
-	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark and not long" $(PARALLEL)
-	$(BIN)/python -m pytest --doctest-modules --pyargs vibroimpact
+test: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run all tests but benchmarks and long series; an error where they have become dearer
+	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark and not long" $(PARALLEL) --budget --doctest-modules tests .editable/vibroimpact
 
 soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run long series, then thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
 	$(BIN)/python -m pytest --ignore=tests/benchmarks -m long $(PARALLEL)

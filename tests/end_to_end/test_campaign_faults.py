@@ -6,21 +6,17 @@ import errno
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from distributed.security import Security
-from harness import warm
 from support.campaign_process import CampaignProcess, fork_servers_of, run_campaign_process, wait_until
 from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, scene_of
-from support.places import TESTS
-from support.served import DASK
+from support.cluster import free_port, started_cluster
 
 import vibroimpact.orchestrator.campaign.campaign as engine
 from vibroimpact.analysis.dataset import Outcome, read_flat
@@ -39,6 +35,13 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals a
 
 
 @pytest.fixture(scope="module")
+def cluster() -> Iterator[str]:
+    """Yield the address of a scheduler with two workers: campaigns that lose none of theirs need not start them."""
+    with started_cluster() as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
 def uninterrupted(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Path]:
@@ -52,12 +55,12 @@ def uninterrupted(
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def finished(cluster: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Return a scene and the dataset of its campaign that nothing disturbed."""
     folder = tmp_path_factory.mktemp("finished")
     scene = folder / "scene.toml"
     scene.write_text(frequency_text(FINISHED_POINTS))
-    code, out, err = run_campaign_process(scene, folder / "campaign", *TWO)
+    code, out, err = run_campaign_process(scene, folder / "campaign", "--scheduler", cluster)
     assert code == 0, err
     assert f"{FINISHED_POINTS} points computed" in out
     return scene, folder / "campaign" / "dataset.nc"
@@ -97,6 +100,7 @@ def test_a_campaign_survives_a_worker_that_is_killed(
     assert not list(scratch.rglob("*"))
 
 
+@pytest.mark.long
 @independent
 @pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux alone")
 def test_a_campaign_survives_the_end_of_what_its_workers_are_forked_from(
@@ -116,7 +120,7 @@ def test_a_campaign_survives_the_end_of_what_its_workers_are_forked_from(
 
 @pytest.mark.parametrize(
     ("uninterrupted", "everyone"),
-    [("independent", True), ("up-down", False)],
+    [("independent", True), pytest.param("up-down", False, marks=pytest.mark.long)],
     indirect=["uninterrupted"],
     ids=["independent, from a terminal", "up-down, to the command alone"],
 )
@@ -158,6 +162,7 @@ def test_ctrl_c_does_not_wait_for_a_long_point(tmp_path: Path) -> None:
     campaign.assert_nothing_lives()
 
 
+@pytest.mark.long
 def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))
@@ -197,7 +202,7 @@ def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identical
 
 @up_and_down
 def test_damaged_parts_are_noticed_and_computed_again(
-    uninterrupted: tuple[Path, Path], killed: Path, tmp_path: Path
+    uninterrupted: tuple[Path, Path], killed: Path, cluster: str, tmp_path: Path
 ) -> None:
     scene, expected = uninterrupted
     folder = shutil.copytree(killed, tmp_path / "campaign")
@@ -205,7 +210,7 @@ def test_damaged_parts_are_noticed_and_computed_again(
     cut.write_bytes(cut.read_bytes()[:1000])
     garbled.write_bytes(b"not a dataset")
     (folder / "parts" / f".{cut.name}.17.0123abcd.tmp").write_bytes(b"half")
-    code, _, err = run_campaign_process(scene, folder, *TWO)
+    code, _, err = run_campaign_process(scene, folder, "--scheduler", cluster)
     assert code == 0
     assert f"{cut.name} was damaged and is removed" in err
     assert f"{garbled.name} was damaged and is removed" in err
@@ -256,19 +261,21 @@ def test_another_kind_of_machine_is_refused(tmp_path: Path) -> None:
     assert 'instruction_set was "none", is "other"' in err
 
 
-def test_workers_of_different_kinds_are_refused(tmp_path: Path) -> None:
+def test_workers_of_different_kinds_are_refused(tmp_path: Path, cluster: str) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(frequency_text(10))
-    code, _, err = run_campaign_process(scene, tmp_path / "campaign", *TWO, runner="UnlikeRunner")
+    where = ("--scheduler", cluster)
+    code, _, err = run_campaign_process(scene, tmp_path / "campaign", *where, runner="UnlikeRunner")
     assert code == 2
     assert_one_clear_message(err)
     assert "one kind of runner" in err
 
 
-def test_a_failed_point_is_a_row_with_its_message(tmp_path: Path) -> None:
+def test_a_failed_point_is_a_row_with_its_message(tmp_path: Path, cluster: str) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(amplitude_text(61, start=-0.3))
-    code, out, err = run_campaign_process(scene, tmp_path / "campaign", *TWO, runner="BrittleRunner")
+    where = ("--scheduler", cluster)
+    code, out, err = run_campaign_process(scene, tmp_path / "campaign", *where, runner="BrittleRunner")
     assert code == 0
     assert "61 points computed" in out
     assert "15 points ended with the outcome error" in err
@@ -353,47 +360,13 @@ def test_an_address_where_nothing_listens_is_refused_within_seconds(tmp_path: Pa
     assert time.monotonic() - began < 20.0
 
 
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
-
-
-@contextmanager
-def started_cluster(address: str, *options: str) -> Iterator[None]:
-    """Start a scheduler and two workers as another command would."""
-    path = os.pathsep.join([str(TESTS), *filter(None, sys.path)])
-    environment = os.environ | {"PYTHONPATH": path}
-    place = ["--host", "127.0.0.1", "--port", address.rpartition(":")[2]]
-    commands = [["scheduler", *place, "--no-dashboard", *options]]
-    commands += [["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *options]] * 2
-    processes = [
-        warm.start(DASK, *command, env=environment, stdout=warm.DEVNULL, stderr=warm.DEVNULL)
-        for command in commands
-    ]
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-
-
-@pytest.fixture
-def dask_cluster() -> Iterator[str]:
-    """Start a cluster that anyone may use, and return the address."""
-    address = f"tcp://127.0.0.1:{free_port()}"
-    with started_cluster(address):
-        yield address
-
-
 @up_and_down
 def test_a_campaign_on_a_dask_cluster_gives_the_same_rows_and_leaves_the_workers(
-    uninterrupted: tuple[Path, Path], tmp_path: Path, dask_cluster: str
+    uninterrupted: tuple[Path, Path], tmp_path: Path, cluster: str
 ) -> None:
     scene, expected = uninterrupted
     for name in ("first", "second"):
-        code, out, err = run_campaign_process(scene, tmp_path / name, "--scheduler", dask_cluster)
+        code, out, err = run_campaign_process(scene, tmp_path / name, "--scheduler", cluster)
         assert code == 0, err
         assert "2 workers" in out
         assert_same_rows(tmp_path / name / "dataset.nc", expected)
@@ -485,6 +458,7 @@ def test_a_full_disk_ends_the_campaign_with_a_message_and_room_lets_it_go_on(
     assert_same_rows(folder / "dataset.nc", expected)
 
 
+@pytest.mark.long
 def test_a_worker_that_is_killed_again_and_again_does_not_end_the_campaign(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))

@@ -203,7 +203,10 @@ time.sleep(600.0)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems know the process group only")
-@pytest.mark.parametrize("fault", ["hang", "stop_process", "fork_away"])
+@pytest.mark.parametrize(
+    "fault",
+    ["hang", *(pytest.param(fault, marks=pytest.mark.long) for fault in ("stop_process", "fork_away"))],
+)
 def test_nothing_of_a_component_outlives_a_parent_that_is_killed(folder: Path, mark: str, fault: str) -> None:
     path = folder / f"orphan_{fault}.toml"
     path.write_text(

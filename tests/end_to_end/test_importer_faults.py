@@ -280,7 +280,10 @@ runner.run({"culprit.fault": 4.0})
 """
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how",
+    [signal.SIGKILL, *(pytest.param(how, marks=pytest.mark.long) for how in (signal.SIGTERM, signal.SIGINT))],
+)
 def test_a_hanging_component_does_not_outlive_its_parent(folder: Path, how: signal.Signals) -> None:
     path = folder / "orphan.toml"
     path.write_text(scene_text("3.0", 600.0), encoding="utf-8")

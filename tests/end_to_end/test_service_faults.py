@@ -130,6 +130,7 @@ def test_a_full_disk_is_one_answer_and_what_was_accepted_goes_on_when_there_is_r
         service.stop()
 
 
+@pytest.mark.long
 def test_a_campaign_waits_for_a_scheduler_that_is_not_there_and_goes_on_when_it_is(tmp_path: Path) -> None:
     cluster = Cluster()
     service, scene = Served(tmp_path / "service", "--scheduler", cluster.address), scene_file(tmp_path, LONG)

@@ -210,7 +210,10 @@ main()
 
 
 # `_elementtree` reports an interrupted import of pyexpat as an ImportError, and `xml.etree` goes on without it.
-@pytest.mark.parametrize("where", ["step", "pyexpat", "xarray", "__del__"])
+@pytest.mark.parametrize(
+    "where",
+    ["step", *(pytest.param(place, marks=pytest.mark.long) for place in ("pyexpat", "xarray", "__del__"))],
+)
 def test_ctrl_c_leaves_no_file_wherever_it_is_heard(where: str, tmp_path: Path) -> None:
     scene, (name, values) = tmp_path / "long.toml", STIFF_AND_PLASTIC
     text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")

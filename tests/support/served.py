@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
 from harness import warm
 
+from support.cluster import free_port, started_cluster
 from support.command_line import ENTRY, ENVIRONMENT
 from vibroimpact.service.client import RemoteJob, Service
 
@@ -43,9 +44,6 @@ def sweep_text(points: int, transient: int, path: str = "independent") -> str:
 
 
 SHORT = sweep_text(40, 50)
-
-
-DASK = "from dask.cli import run_cli; run_cli()"
 
 
 class Served:
@@ -84,28 +82,18 @@ class Served:
 
 
 class Cluster:
-    """A Dask scheduler with one worker: they run while it is entered, and are killed at the end of that."""
+    """A Dask scheduler with one worker: they run while it is entered, each time at the same address."""
 
     def __init__(self) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self._port = free.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{self._port}"
-        self._processes: list[warm.Program] = []
+        self.address = f"tcp://127.0.0.1:{free_port()}"
+        self._stack = ExitStack()
 
     def __enter__(self) -> Self:
-        where = ("--host", "127.0.0.1", "--port", str(self._port))
-        how = ("--nworkers", "1", "--nthreads", "1", "--no-nanny")
-        for command in (("scheduler", *where), ("worker", self.address, *how)):
-            self._processes.append(
-                warm.start(DASK, *command, "--no-dashboard", stdout=warm.DEVNULL, stderr=warm.DEVNULL)
-            )
+        self._stack.enter_context(started_cluster(self.address, workers=1))
         return self
 
     def __exit__(self, *_: object) -> None:
-        for process in self._processes:
-            process.kill()
-            process.wait()
-        self._processes.clear()
+        self._stack.close()
 
 
 def scene_file(folder: Path, text: str) -> Path:

@@ -94,6 +94,7 @@ def test_a_journal_that_grows_is_not_recovered(address: str, tmp_path: Path) -> 
     assert not (tmp_path / "b.nc").exists()
 
 
+@pytest.mark.long
 def test_a_rig_that_dies_leaves_the_recording_until_then(tmp_path: Path) -> None:
     with program("rig", "serve", RIG, "--port", "0", cwd=tmp_path) as server:
         assert server.stdout is not None

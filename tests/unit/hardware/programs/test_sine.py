@@ -192,6 +192,7 @@ def test_a_program_whose_guardian_has_gone_comes_to_rest_by_itself(live: Bench) 
     assert running.seen.steepest <= STEEPEST
 
 
+@pytest.mark.long
 def test_more_signals_do_not_hurry_it(live: Bench) -> None:
     with driven(live) as running:
         running.drive(0.3)
@@ -213,7 +214,7 @@ def server() -> Iterator[tuple[warm.Program, str]]:
         process.kill()
 
 
-@pytest.mark.parametrize("program_too", [True, False])
+@pytest.mark.parametrize("program_too", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_where_the_server_has_gone_nothing_is_claimed_of_the_output(
     server: tuple[warm.Program, str], program_too: bool
 ) -> None:
@@ -262,7 +263,7 @@ with opened_rig("grpc://" + sys.argv[1]) as rig:
 """
 
 
-@pytest.mark.parametrize("hanging", [False, True])
+@pytest.mark.parametrize("hanging", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_where_nobody_can_attach_the_guardian_waits_for_the_device(live: Bench, hanging: bool) -> None:
     # as with a driver in the program; the end of the task, which the driver does there, the test does here
     with warm.start(WITHOUT_ATTACHING, live.server.address) as program:
@@ -284,6 +285,7 @@ def test_where_nobody_can_attach_the_guardian_waits_for_the_device(live: Bench, 
     assert live.control.state()["tasks"] == {}
 
 
+@pytest.mark.long
 def test_a_device_that_is_not_freed_is_said(live: Bench) -> None:
     with warm.start(WITHOUT_ATTACHING, live.server.address) as program:
         assert program.stdout is not None

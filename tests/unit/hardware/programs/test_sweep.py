@@ -142,6 +142,7 @@ def test_the_same_command_has_nothing_to_do_when_all_is_measured(bench: Bench, m
     assert (measured / "dataset.nc").read_bytes() == before
 
 
+@pytest.mark.long
 def test_a_sweep_that_is_killed_goes_on_and_is_that_of_one_that_nothing_disturbed(
     bench: Bench, measured: Path, tmp_path: Path
 ) -> None:
@@ -187,6 +188,7 @@ def test_ctrl_c_brings_the_output_to_rest_and_keeps_what_is_measured(bench: Benc
     assert 2 <= read_flat(folder / "dataset.nc").sizes["run"] < 16
 
 
+@pytest.mark.long
 def test_ctrl_c_is_heard_before_the_output_has_started(bench: Bench, tmp_path: Path) -> None:
     with started(bench, tmp_path, tmp_path / "sweep") as process:
         while not any(name.startswith("vibroimpact-output") for name in bench.control.state()["tasks"]):

@@ -43,6 +43,7 @@ def test_a_worker_that_dies_before_the_first_chunk_is_replaced_and_the_new_one_i
         assert pool.lost_workers == 2
 
 
+@pytest.mark.long
 @kills_itself
 def test_a_call_that_kills_every_worker_is_one_clear_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -126,6 +127,7 @@ def test_the_time_in_which_a_campaign_was_suspended_is_not_waited_for_workers(
         assert pool.worker_addresses() == (worker,)
 
 
+@pytest.mark.long
 @kills_itself
 def test_a_worker_that_does_not_answer_any_more_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
