@@ -19,6 +19,8 @@ class _Told:
 
     def __init__(self, config: pytest.Config, link: Connection) -> None:
         self._config, self._link = config, link
+        self.listens = False
+        """Whether it has been told of the warnings before the fork, as every new plugin is."""
 
     def pytest_runtest_logstart(self, nodeid: str, location: tuple[str, int | None, str]) -> None:
         self._link.send(("start", {"nodeid": nodeid, "location": location}))
@@ -37,12 +39,12 @@ class _Told:
         nodeid: str,
         location: tuple[str, int, str] | None,
     ) -> None:
-        if when != "runtest":
-            return  # of the time before the fork
+        if not self.listens:
+            return
         # its class may be one that cannot be sent
         told = f"{warning_message.category.__name__}: {warning_message.message}"
         plain = warnings.WarningMessage(
-            UserWarning(told), UserWarning, warning_message.filename, warning_message.lineno
+            Warning(told), Warning, warning_message.filename, warning_message.lineno
         )
         given = {"warning_message": plain, "when": when, "nodeid": nodeid, "location": location}
         self._link.send(("warning", given))
@@ -72,9 +74,12 @@ def run_share(session: pytest.Session, link: Connection, folder: Path) -> NoRetu
 
 def _become_a_worker(config: pytest.Config, link: Connection, folder: Path) -> None:
     gc.freeze()
+    gc.enable()
     plugins: Any = config.pluginmanager
     plugins.unregister(name="terminalreporter")
-    plugins.register(_Told(config, link))
+    told = _Told(config, link)
+    plugins.register(told)
+    told.listens = True
     capture = plugins.getplugin("capturemanager")
     # the files into which output is captured are those of all copies
     capture.stop_global_capturing()

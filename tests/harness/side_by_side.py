@@ -6,6 +6,7 @@ another one goes on. Where a process cannot be forked, the tests run one after t
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from multiprocessing.connection import Connection, Pipe, wait
@@ -43,11 +44,16 @@ def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "run the tests in so many forked copies of this process, where it can be forked"
     parser.addoption("--side-by-side", type=int, default=0, metavar="N", help=text)
+    text = "beside --side-by-side: start every program anew, and none as a copy of a warm process"
+    parser.addoption("--cold", action="store_true", help=text)
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     if _is_wanted(session.config):
-        warm.start_server()
+        # nothing of it is garbage, and this process does little else
+        gc.disable()
+        if not session.config.option.cold:
+            warm.start_server()
 
 
 def _is_wanted(config: pytest.Config) -> bool:

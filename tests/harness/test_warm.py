@@ -1,0 +1,76 @@
+"""A copy of the warm process is, to whoever started it, a Python that was started anew."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from harness import warm
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the warm process runs on Linux alone")
+
+ENDS = {
+    "nothing": "pass",
+    "a code": "import sys; sys.exit(3)",
+    "words": "import sys; sys.exit('words')",
+    "an exception": "1 / 0",
+    "Ctrl-C": "raise KeyboardInterrupt",
+    "a signal": "import os; os.kill(os.getpid(), 9)",
+    "an exit function": "import atexit; atexit.register(print, 'at the end')",
+    "a thread": "import threading, time; threading.Thread(target=lambda: (time.sleep(.05), print('late'))).start()",
+    "a reader that has gone": "import os, sys; os.close(1); print('nowhere')",
+    "arguments": "import sys; print(sys.argv, __name__)",
+}
+
+
+@pytest.mark.parametrize("program", ENDS.values(), ids=ENDS)
+def test_it_ends_as_a_program_that_is_started_anew(program: str) -> None:
+    warm_, cold = (warm.run(program, "a", "b c", cold=cold) for cold in (False, True))
+    assert warm_.returncode == cold.returncode
+    assert warm_.stdout == cold.stdout
+    assert warm_.stderr.splitlines()[-1:] == cold.stderr.splitlines()[-1:]
+
+
+def test_folder_environment_streams_and_process_group_are_its_own(tmp_path: Path) -> None:
+    program = "import os, sys, tempfile; print(os.getcwd(), os.environ['A'], len(os.environ), tempfile.gettempdir(), "
+    program += (
+        "os.getpgrp() == os.getpid(), os.getsid(0) == os.getpid()); print(sys.stdin.read(), file=sys.stderr)"
+    )
+    for session in (False, True):
+        environment = {"A": "b", "TMPDIR": str(tmp_path)}
+        options = {
+            "cwd": tmp_path,
+            "env": environment,
+            "stdin": subprocess.PIPE,
+            "start_new_session": session,
+        }
+        process = warm.start(program, **options)
+        assert process.stdin is not None
+        process.stdin.write("given")
+        process.stdin.close()
+        out, err = process.communicate(timeout=30)
+        words = out.split()
+        assert words[:2] + words[3:] == [str(tmp_path), "b", str(tmp_path), "True", str(session)]
+        assert err == "given\n"
+
+
+def test_a_signal_reaches_it_alone() -> None:
+    program = "import time; print('ready', flush=True); time.sleep(60)"
+    first, second = warm.start(program), warm.start(program)
+    for process in (first, second):
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+    os.killpg(first.pid, signal.SIGINT)
+    assert first.wait(30) == -signal.SIGINT
+    assert second.poll() is None
+    with pytest.raises(subprocess.TimeoutExpired):
+        second.wait(0.05)
+    second.kill()
+    assert second.wait(30) == -signal.SIGKILL
+    for process in (first, second):
+        process.communicate()
