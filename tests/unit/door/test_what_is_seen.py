@@ -1,0 +1,20 @@
+"""What completion, `help()`, `inspect.signature` and `--help` see is what they saw: two files hold it."""
+
+from __future__ import annotations
+
+import pytest
+from support import public_names
+from support.public_names import COMMANDS, NAMES
+
+
+@pytest.mark.slow
+def test_names_have_the_signatures_and_descriptions_of_the_list():
+    assert public_names.names() == NAMES.read_text(encoding="utf-8"), (
+        "run python -P tests/support/public_names.py"
+    )
+
+
+def test_commands_have_the_options_and_help_of_the_list():
+    assert public_names.commands() == COMMANDS.read_text(encoding="utf-8"), (
+        "run python -P tests/support/public_names.py"
+    )
