@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.analysis.dataset.outputs import refuse_outputs
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
@@ -50,6 +51,21 @@ def given_path(given: object) -> Path:
     if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
         raise UsageError(f"path: expected the name of a file or folder, got {given!r}.")
     return Path(given)
+
+
+def given_result(given: PathLike | None) -> Path | None:
+    """Return the dataset that a caller wants to be written as well, if any; it is looked at before anything runs.
+
+    Raises
+    ------
+    UsageError
+        It is no name, or nothing can be written there.
+    """
+    if given is None:
+        return None
+    path = given_path(given)
+    refuse_outputs([], path, ending=path.suffix)
+    return path
 
 
 def given_paths(given: PathLike | Sequence[PathLike]) -> list[Path]:

@@ -14,7 +14,7 @@ from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene
+from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_result, given_scene
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
@@ -27,6 +27,7 @@ from vibroimpact.orchestrator.study import BUDGET, refuse_unreached, study_accur
 from vibroimpact.orchestrator.study import dataset_of as accuracy_dataset
 from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
 from vibroimpact.orchestrator.study.preparation import prepared_scene, with_found_modes
+from vibroimpact.orchestrator.study.refusals import refuse_misuse
 from vibroimpact.returned import ONE_AT_A_TIME, in_memory
 
 
@@ -218,19 +219,22 @@ def accuracy(
     SceneError
         With all problems of the scene, each on one line.
     UsageError
-        There is nothing to vary, no such quantity, or no way reaches the tolerance.
+        There is nothing to vary, no such quantity, no such budget, no place for the file, or no way reaches the
+        tolerance. Only the last takes the time of a study, unless the reference is known to less.
 
     Examples
     --------
     >>> accuracy("examples/single_run.toml", tolerance=1e-6).attrs["chosen"]    # doctest: +SKIP
     'fused'
     """
+    refuse_misuse(tolerance, of, budget)
+    target = given_result(path)
     study = study_accuracy(
         with_found_modes(given_scene(scene)), tolerance=tolerance, quantity=of, budget=budget
     )
     dataset = accuracy_dataset(study)
-    if path is not None:
-        write_results(dataset, given_path(path), kind="accuracy")
+    if target is not None:
+        write_results(dataset, target, kind="accuracy")
     refuse_unreached(study)
     return dataset.assign_attrs(results_kind="accuracy")
 
@@ -255,17 +259,20 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     ------
     SceneError
         With all problems of the scene, each on one line.
+    UsageError
+        The dataset cannot be written there.
 
     Examples
     --------
     >>> effects("examples/chatter.toml").attrs["not_simulated"].split(", ")[0]    # doctest: +SKIP
     'recorded drive'
     """
+    target = given_result(path)
     chosen = with_found_modes(given_scene(scene))
     alone = chosen.with_sweep({}) if chosen.sweep else chosen
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
-    if path is not None:
-        write_results(dataset, given_path(path), kind="effects")
+    if target is not None:
+        write_results(dataset, target, kind="effects")
     return dataset.assign_attrs(results_kind="effects")
 
 
@@ -337,7 +344,7 @@ def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> 
     Raises
     ------
     UsageError
-        There is no such case.
+        There is no such case, or one is named twice, or the dataset cannot be written there.
 
     Examples
     --------
@@ -345,9 +352,10 @@ def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> 
     >>> float(found.figure[0]), bool(found.is_met[0])
     (0.0, True)
     """
+    target = given_result(path)
     found = hard_cases_dataset(measured_cases([only] if isinstance(only, str) else only))
-    if path is not None:
-        write_results(found, given_path(path), kind="hard_cases")
+    if target is not None:
+        write_results(found, target, kind="hard_cases")
     return found.assign_attrs(results_kind="hard_cases")
 
 

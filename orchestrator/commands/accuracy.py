@@ -23,6 +23,7 @@ from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study import Measured, Study, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.choice import advice, error_of_reference, refuse_unreached
+from vibroimpact.orchestrator.study.refusals import refuse_misuse
 from vibroimpact.orchestrator.study.tuned import tuned_text
 
 MEGABYTE = 1e6
@@ -41,7 +42,14 @@ def study_scene(
     budget: float,
     force: bool,
 ) -> None:
-    """Study a scene, print a table and what to choose, and write what was asked for."""
+    """Study a scene, print a table and what to choose, and write what was asked for.
+
+    Raises
+    ------
+    UsageError
+        Before anything runs, where the arguments alone show it.
+    """
+    refuse_misuse(tolerance, quantity, budget)
     if write is not None and tolerance is None:
         raise UsageError(
             f"{option('write')}: expected a tolerance to tune for, got none. Add {option('tolerance')} 1e-6."
@@ -49,12 +57,13 @@ def study_scene(
     refuse_outputs([path], output, figure)
     if write is not None:
         refuse_outputs([path], write, ending=".toml")
-    scene = with_modes(opened_scene(path, changes))
+    opened = opened_scene(path, changes)
     refuse_overwriting(
         output,
         force,
         lambda there: (there.get("results_kind"), there.get("scene_file")) == ("accuracy", str(path)),
     )
+    scene = with_modes(opened)
     with _shown(scene.title or scene.source, quantity) as told:
         study = study_accuracy(scene, tolerance=tolerance, quantity=quantity, budget=budget, told=told)
     _print(study)

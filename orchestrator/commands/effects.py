@@ -23,12 +23,13 @@ def show_effects(
 ) -> None:
     """Measure the effects of a scene, print them, and write what was asked for."""
     refuse_outputs([path], output, figure)
-    scene = with_modes(opened_scene(path, changes))
+    opened = opened_scene(path, changes)
     refuse_overwriting(
         output,
         force,
         lambda there: (there.get("results_kind"), there.get("scene_file")) == ("effects", str(path)),
     )
+    scene = with_modes(opened)
     alone = scene.with_sweep({}) if scene.sweep else scene
     say(f"{engine(alone)}")
     shares = shares_of(alone, effects_of(alone))

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -69,18 +69,32 @@ def cases_named(names: Sequence[str]) -> list[HardCase]:
         There is no such case, or one is named twice.
     """
     known = {case.name: case for case in CASES}
-    for name, times in Counter(names).items():
+    asked = _as_texts(names)
+    for name, times in Counter(asked).items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"Did you mean {near[0]}?" if near else f"There are {', '.join(known)}."
             raise UsageError(f"{option('only')}: expected the name of a hard case, got {name!r}. {hint}")
         if times > 1:
             raise UsageError(f"{option('only')}: expected each name once, got {name!r} {times} times.")
-    return [case for case in CASES if not names or case.name in names]
+    return [case for case in CASES if not asked or case.name in asked]
+
+
+def _as_texts(names: object) -> list[str]:
+    """Return names as a list; raise UsageError where one is no text."""
+    listed: list[str] = []
+    for name in names if isinstance(names, Iterable) else [names]:
+        if not isinstance(name, str):
+            raise UsageError(f"{option('only')}: expected the name of a hard case, got {name!r}.")
+        listed.append(name)
+    return listed
 
 
 def measured_cases(
-    names: Sequence[str] = (), told: Callable[[Measured], None] = lambda measured: None
+    names: Sequence[str] = (),
+    told: Callable[[Measured], None] = lambda measured: None,
+    *,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> list[Measured]:
     """Run hard cases.
 
@@ -90,6 +104,8 @@ def measured_cases(
         Those to run; none: all.
     told : callable
         Given each as soon as it has run.
+    clock : callable
+        Returns the wall time since some instant, s.
 
     Raises
     ------
@@ -98,19 +114,19 @@ def measured_cases(
     """
     found = []
     for case in cases_named(names):
-        found.append(_measured(case))
+        found.append(_measured(case, clock))
         told(found[-1])
     return found
 
 
-def _measured(case: HardCase) -> Measured:
-    began = time.perf_counter()
+def _measured(case: HardCase, clock: Callable[[], float]) -> Measured:
+    began = clock()
     try:
         found, failure = case.measure(), ""
     except ComponentError as error:
         nothing = Curve(np.empty(0), np.empty(0), "", "")
         found, failure = Found(math.nan, nothing), str(error).splitlines()[0]
-    return Measured(case, found, time.perf_counter() - began, failure)
+    return Measured(case, found, clock() - began, failure)
 
 
 def dataset_of(measured: Sequence[Measured]) -> xr.Dataset:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
@@ -14,17 +13,17 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import Rows, described
-from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, UsageError
+from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study import clock
 from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
 from vibroimpact.orchestrator.study.measured import Measured, Study
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
-from vibroimpact.orchestrator.study.memory import UNKNOWN, memory_of_ways
+from vibroimpact.orchestrator.study.memory import UNKNOWN
 from vibroimpact.orchestrator.study.models import told_by
 from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import (
@@ -36,9 +35,14 @@ from vibroimpact.orchestrator.study.references import (
     scales_of,
     sensitivity_of,
 )
+from vibroimpact.orchestrator.study.refusals import (
+    refuse_misuse,
+    refuse_one_way,
+    refuse_vague_reference,
+)
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
-from vibroimpact.orchestrator.study.way import CallCounter, Trial, Way
+from vibroimpact.orchestrator.study.way import Trial, Way
 from vibroimpact.orchestrator.study.ways import remarks_on, ways_of
 
 BUDGET = 40.0
@@ -91,11 +95,13 @@ def study_accuracy(
     Raises
     ------
     UsageError
-        There is no such quantity, nothing to vary, or no tolerance > 0.
+        There is no such quantity, nothing to vary, a budget that is no time, or a tolerance that no way can reach:
+        double precision or the reference of the scene does not tell it. No way has run then.
     """
-    _refuse_misuse(tolerance, quantity)
-    began = time.perf_counter()
+    refuse_misuse(tolerance, quantity, budget)
+    end = clock.CLOCK.now() + budget
     whole, late = studied_scene(scene), max(LEAST_LATE, LATE_SHARE * budget)
+    refuse_one_way(ways_of(whole), scene)
     reference = reference_of(whole)
     orbit = "chaotic" if reference.chaotic else ""
     if not reference.chaotic and whole.general is None and whole.replay is None:
@@ -103,12 +109,13 @@ def study_accuracy(
     studied = first_impacts(whole, reference) if reference.chaotic else whole
     if reference.chaotic:
         reference = replace(reference_of(studied), chaotic=True, sensitivity=reference.sensitivity)
+    refuse_vague_reference(tolerance, quantity, reference)
     found: list[Measured] = []
     finest: dict[Scene, Reference] = {}
     with ExitStack() as stack:
         measured: list[tuple[Measured, Trial]] = []
         given = {"speed": _typical_speed(reference), "rate": _rate_of(scene)}
-        ways = _refuse_none(ways_of(given_up_after(studied, late), **given), scene)
+        ways = ways_of(given_up_after(studied, late), **given)
         for way in ways:
             one, trial = _tried(way, _told_by(way, reference, finest))
             if trial is not None:
@@ -117,7 +124,7 @@ def study_accuracy(
             told(one)
             found.append(one)
         _add_memory(given_up_after(studied, late), given, ways, [one for one, _ in measured])
-        _time_in_turn(measured, began + budget)
+        _time_in_turn(measured, end)
     if reference.chaotic:
         _add_statistics(whole, given_up_after(whole, late), found)
     wanted = math.nan if tolerance is None else tolerance
@@ -195,22 +202,6 @@ def _rate_of(scene: Scene) -> float:
     return scene.sampling_rate or math.nan
 
 
-def _refuse_misuse(tolerance: float | None, quantity: str) -> None:
-    if quantity not in ("all", *QUANTITIES):
-        raise UsageError(f"{option('of')}: expected all, {', '.join(QUANTITIES)}, got {quantity!r}.")
-    if tolerance is not None and not 0.0 < tolerance < math.inf:
-        raise UsageError(f"{option('tolerance')}: expected a relative error > 0, got {tolerance!r}.")
-
-
-def _refuse_none(ways: list[Way], scene: Scene) -> list[Way]:
-    if len([way for way in ways if not way.model]) < 2:
-        raise UsageError(
-            f"{scene.source}: expected a scene with something to vary (stops, or components that exchange values), "
-            "got one that is simulated in one way. It is exact."
-        )
-    return ways
-
-
 def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
     """Run a way once, counting calls, and compare what it shows; no trial where it failed."""
     try:
@@ -239,7 +230,7 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
         one.seconds.append(found.seconds)
         return one, None
     if found.seconds < COUNTED:
-        one.calls = _counted(way)
+        one.calls = clock.CLOCK.calls(way)
     return one, trial
 
 
@@ -257,32 +248,22 @@ def _add_memory(
 ) -> None:
     """Find what memory each way takes that did not fail."""
     places = {id(way): place for place, way in enumerate(ways)}
-    memory = memory_of_ways(scene, given, [places[id(one.way)] for one in measured])
+    memory = clock.CLOCK.memory(scene, given, [places[id(one.way)] for one in measured])
     for one in measured:
         one.memory = memory.get(places[id(one.way)], UNKNOWN)
-
-
-def _counted(way: Way) -> int:
-    """Return the calls of functions of FMUs in a run; -1 where they are not counted."""
-    counter = CallCounter()
-    trial = way.open(counter.wrap)
-    try:
-        trial.run()
-        return sum(counter.calls.values()) or -1
-    finally:
-        trial.close()
 
 
 def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], end: float) -> None:
     """Run all ways in turn, again and again, until the time is over; a way that failed is timed as well."""
     gc.collect()
     for round_number in range(MOST_ROUNDS):
-        if round_number >= LEAST_ROUNDS and time.perf_counter() > end:
+        if round_number >= LEAST_ROUNDS and clock.CLOCK.now() > end:
             break
         for one, trial in measured:
-            if round_number >= LEAST_ROUNDS and sum(one.seconds) > EACH_SHARE * (end - time.perf_counter()):
+            left = end - clock.CLOCK.now()
+            if round_number >= LEAST_ROUNDS and sum(one.seconds) > EACH_SHARE * left:
                 continue
-            one.seconds.append(trial.run().seconds)
+            one.seconds.append(clock.CLOCK.wall_time(trial))
 
 
 def _add_statistics(scene: Scene, limited: Scene, found: Sequence[Measured]) -> None:

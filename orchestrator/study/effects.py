@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import DAMPING
 from vibroimpact.orchestrator.scene.summary import effects as called_effects
 from vibroimpact.orchestrator.scene.summary import laws
+from vibroimpact.orchestrator.study import clock
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
 from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
 from vibroimpact.orchestrator.study.references import scales_of
@@ -301,7 +301,7 @@ def shares_of(
     found = []
     scales = scales_of(scene)
     with opened(scene) as full:
-        whole = float(np.median([_timed(full) for _ in range(PAIRS)]))
+        whole = float(np.median([clock.CLOCK.processor_time(full) for _ in range(PAIRS)]))
     for effect in effects:
         share = _share(effect, whole, scales)
         told(share)
@@ -324,7 +324,8 @@ def _share(effect: Effect, whole: float, scales: Scales) -> Share:
         with opened(effect.base) as full, opened(effect.without) as trial:
             reference, alone = full.run(), trial.run()
             gc.collect()
-            pairs = np.array([(_timed(full), _timed(trial)) for _ in range(PAIRS)])
+            time_of = clock.CLOCK.processor_time
+            pairs = np.array([(time_of(full), time_of(trial)) for _ in range(PAIRS)])
     except ComponentError as error:
         return _failed(effect, error)
     seconds = pairs[:, 0] - pairs[:, 1]
@@ -340,13 +341,6 @@ def _share(effect: Effect, whole: float, scales: Scales) -> Share:
     if not words:
         words = NO_CHANGE if change == 0.0 else f"up to {100.0 * change:.3g} %"
     return Share(effect, seconds, whole, words, change)
-
-
-def _timed(trial: SceneTrial | ReplayTrial) -> float:
-    """Return the processor time of a run, s; wall time where another process computes it."""
-    began, processor = time.perf_counter(), time.process_time()
-    trial.run()
-    return time.perf_counter() - began if trial.is_guarded else time.process_time() - processor
 
 
 def _failed(effect: Effect, error: Exception) -> Share:

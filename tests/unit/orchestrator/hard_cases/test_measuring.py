@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -44,9 +46,14 @@ def test_names_are_those_of_the_page_and_differ() -> None:
         (["chater"], "got 'chater'. Did you mean chatter?"),
         (["x" * 400], "There are grazing-from-above, "),
         (["chatter", "chatter"], "expected each name once, got 'chatter' 2 times"),
+        (["chatter", 3], "got 3."),
+        (None, "got None."),
     ],
 )
-def test_names_that_are_none_are_refused(names: list[str], message: str) -> None:
+def test_names_that_are_none_are_refused(
+    monkeypatch: pytest.MonkeyPatch, names: list[str], message: str
+) -> None:
+    let_nothing_run(monkeypatch)
     with pytest.raises(UsageError, match=r"only: expected") as refused:
         vi.hard_cases(names)
     assert message in str(refused.value)
@@ -67,23 +74,40 @@ def test_a_bound_that_is_missed_is_in_the_dataset_and_in_the_figure(missed: Hard
     assert vi.draw(found).axes[0].get_title() == "never: missed"
 
 
-def test_a_case_that_does_not_run_says_why() -> None:
+def let_nothing_run(patch: pytest.MonkeyPatch) -> None:
+    """Let each hard case be an error."""
+
+    def measure(case: HardCase, clock: Callable[[], float]) -> Measured:
+        raise AssertionError("a case has run")
+
+    patch.setattr("vibroimpact.orchestrator.hard_cases.measuring._measured", measure)
+
+
+def test_a_dataset_that_has_no_place_is_refused_before_any_case_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    let_nothing_run(monkeypatch)
+    with pytest.raises(UsageError, match="expected a place where a file can be written, got no folder"):
+        vi.hard_cases("chatter", "nowhere/cases.nc")
+
+
+def test_a_case_takes_as_long_as_the_clock_says(missed: HardCase) -> None:
+    ticks = itertools.count(1.0, 2.5)
+    (one,) = measured_cases(clock=lambda: next(ticks))
+    assert one.seconds == 2.5
+    assert dataset_of([one]).seconds.values.tolist() == [2.5]
+
+
+def test_a_case_that_does_not_run_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     def crash() -> Found:
         raise ComponentError("body: fmi3DoStep returned error at time 1\nmore")
 
     case = replace(CASES[0], measure=crash)
-    (one,) = [measured for measured in _measured(case)]
+    monkeypatch.setattr("vibroimpact.orchestrator.hard_cases.measuring.CASES", (case,))
+    (one,) = measured_cases()
     assert one.failure == "body: fmi3DoStep returned error at time 1"
     assert not one.is_met
     found = dataset_of([one])
     assert math.isnan(found.figure[0])
     assert found.attrs["missed"] == case.name
-
-
-def _measured(case: HardCase) -> list[Measured]:
-    from vibroimpact.orchestrator.hard_cases import measuring
-
-    return [measuring._measured(case)]
 
 
 def test_a_figure_that_is_no_number_misses_its_bound() -> None:

@@ -13,20 +13,20 @@ import pytest
 from rich.console import Console
 from support.fmu_factory import mass
 from support.places import EXAMPLES
-from support.quick_studies import BUDGET, run_once
+from support.still_clock import NEVER_LATE, let_nothing_run, stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.commands.accuracy import table_of
 from vibroimpact.orchestrator.scene import Scene, load_scene
-from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study import Measured, Study, advice, dataset_of, study_accuracy, ways
 from vibroimpact.orchestrator.study.accuracy import studied_scene
-from vibroimpact.orchestrator.study.choice import cheapest
+from vibroimpact.orchestrator.study.choice import cheapest, error_of_reference, refuse_unreached
 from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.memory import IS_MEASURED, memory_of_ways
 from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
-from vibroimpact.orchestrator.study.references import reference_of
+from vibroimpact.orchestrator.study.references import Reference, reference_of
 from vibroimpact.orchestrator.study.revision import RevisedTrial
 from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
 from vibroimpact.orchestrator.study.way import Trial
@@ -50,21 +50,28 @@ FREE: dict[str, Any] = {
 }
 
 
-def studied_once(scene: Scene, **options: Any) -> Study:
-    """Study a scene without what the tests of `rigid` are about: repeated runs, counted calls, memory."""
+COARSE: dict[str, Any] = {"STEPS_A_PERIOD": (23, 61), "REVISED_CONTACT_STEPS": (10.0, 40.0)}
+"""Settings of ways with equal steps, or steps that are made again: finer ones take most of the time of a study."""
+
+
+def studied_once(scene: Scene, settings: dict[str, Any] = COARSE, **options: Any) -> Study:
+    """Study a scene in all ways, by some settings of them, without measuring what they cost."""
     with pytest.MonkeyPatch.context() as patch:
-        run_once(patch)
-        return study_accuracy(scene, budget=BUDGET, **options)
+        stop_the_clock(patch)
+        for name, values in settings.items():
+            patch.setattr(ways, name, values)
+        return study_accuracy(scene, budget=NEVER_LATE, **options)
 
 
 @pytest.fixture(scope="module")
 def rigid() -> Study:
-    return study_accuracy(Scene.from_dict(P11), tolerance=1e-6, budget=1.0)
+    return studied_once(Scene.from_dict(P11), {}, tolerance=1e-6)
 
 
 @pytest.fixture(scope="module")
 def yielding() -> Study:
-    return studied_once(Scene.from_dict(HERTZ), tolerance=1e-7)
+    plain = {"STEPS_A_PERIOD": COARSE["STEPS_A_PERIOD"]}
+    return studied_once(Scene.from_dict(HERTZ), plain, tolerance=1e-7)
 
 
 def ladder(study: Study, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -139,9 +146,8 @@ RIGID: dict[str, Any] = {"position": 1e-4, "restitution": 0.6}
 SOFT: dict[str, Any] = {"law": "kelvin_voigt", "position": 1e-4, "stiffness": 1e4, "damping": 1.0}
 
 
-def errors_by_step(scene: Scene, trials: dict[float, Trial]) -> tuple[np.ndarray, np.ndarray]:
+def errors_by_step(reference: Reference, trials: dict[float, Trial]) -> tuple[np.ndarray, np.ndarray]:
     """Return the steps, or steps a contact, of trials with their errors, those of which no impact is missed."""
-    reference = reference_of(scene)
     errors = {
         step: errors_of(trial.run(), reference.observation, reference.scales)
         for step, trial in trials.items()
@@ -175,10 +181,11 @@ def test_a_structure_on_rigid_stops_is_followed_by_plain_steps_and_by_step_revis
     scene = studied_scene(Scene.from_dict(tables))
     assert scene.period is not None
     steps = [scene.period / count for count in (1009, 5003, 20011)]
-    found, errors = errors_by_step(scene, {step: PlainStepsTrial(scene, step) for step in steps})
+    reference = reference_of(scene)
+    found, errors = errors_by_step(reference, {step: PlainStepsTrial(scene, step) for step in steps})
     assert len(found) == 3
     assert errors[-1] < 0.1 * errors[0]  # of first order: the last step is a twentieth of the first
-    _, errors = errors_by_step(scene, {0.02: RevisedTrial(scene, 0.02 * scene.period)})
+    _, errors = errors_by_step(reference, {0.02: RevisedTrial(scene, 0.02 * scene.period)})
     assert errors[0] < 1e-9
 
 
@@ -201,14 +208,14 @@ def test_a_structure_on_yielding_stops_is_followed_by_held_forces_and_by_step_re
 ) -> None:
     scene = studied_scene(Scene.from_dict(tables))
     assert scene.period is not None
-    steps = [scene.period / count for count in (1009, 5003)]
+    steps, reference = [scene.period / count for count in (503, 2503)], reference_of(scene)
     for exchange in ("jacobi", "gauss_seidel"):
         trials = {step: PlainForcesTrial(scene, exchange, step) for step in steps}
-        _, errors = errors_by_step(scene, dict(trials))
+        _, errors = errors_by_step(reference, dict(trials))
         assert errors[1] == pytest.approx(errors[0] / 5.0, rel=0.5)
     longest = 0.2 * scene.period
     counts = {1.0 / count: RevisedTrial(scene, longest, count) for count in (10.0, 40.0)}
-    found, errors = errors_by_step(scene, dict(counts))
+    found, errors = errors_by_step(reference, dict(counts))
     assert observed_order(found, errors) == pytest.approx(2.0, abs=0.3)
 
 
@@ -260,10 +267,11 @@ def test_an_impact_whose_contact_is_not_over_is_none_of_a_way_either() -> None:
             }
         )
     )
-    ways = (CoupledTrial(scene, "3.0"), CoupledTrial(scene, "2.0"), ModelExchangeTrial(scene, 1e-8))
-    _, errors = errors_by_step(scene, dict(enumerate(ways)))
+    trials = (CoupledTrial(scene, "3.0"), CoupledTrial(scene, "2.0"), ModelExchangeTrial(scene, 1e-8))
+    reference = reference_of(scene)
+    _, errors = errors_by_step(reference, dict(enumerate(trials)))
     assert len(errors) == 3
-    assert len(reference_of(scene).observation.impacts) == 1
+    assert len(reference.observation.impacts) == 1
 
 
 def test_samples_tell_impacts_as_late_as_they_are_apart() -> None:
@@ -312,13 +320,17 @@ def test_the_energy_that_held_forces_add_is_an_error_too() -> None:
     assert 0.0 <= energies["coupled, FMI 3.0"] < 1e-5
 
 
-def test_what_it_costs_is_counted_too(rigid: Study) -> None:
-    fused, coupled = rigid.measured[:2]
+def test_what_it_costs_is_counted_too() -> None:
+    # two periods, since each way runs six times at least, and once more in a process of its own
+    short = Scene.from_dict(P11 | {"record": {"recorded_periods": 2}})
+    study = study_accuracy(short, tolerance=1e-6, budget=1.0)
+    fused, coupled = study.measured[:2]
+    assert study.chosen is fused
     assert 0 < fused.calls < coupled.calls
-    assert {one.calls for one in rigid.measured if "CVode" in one.way.name} == {-1}  # FMPy calls it
+    assert {one.calls for one in study.measured if "CVode" in one.way.name} == {-1}  # FMPy calls it
     assert all(len(one.seconds) >= 3 for one in (fused, coupled))
     assert 0.0 < fused.cost < coupled.cost
-    its = [one for one in rigid.measured if not one.errors.failure]
+    its = [one for one in study.measured if not one.errors.failure]
     assert all(one.memory > 0 for one in its) or not IS_MEASURED
 
 
@@ -450,7 +462,7 @@ CHAOTIC_COMPONENTS: dict[str, Any] = {
         {"from": f"stop.{name}", "to": f"body.contact[1].{name}"}
         for name in ("applied_restitution", "applied_force")
     ],
-    "record": {"recorded_time": 400.0, "variables": ["body.displacement"], "rate": 5.0},
+    "record": {"recorded_time": 200.0, "variables": ["body.displacement"], "rate": 5.0},
     "execution": {"macro_step": 1.0},
 }
 
@@ -484,7 +496,56 @@ def test_what_cannot_be_compared_is_said(rigid: Study) -> None:
     assert "the reference is known to 1e+00 only" in advice(replace(rigid, reference=vague, chosen=None))
 
 
-def test_misuse_is_told() -> None:
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"of": "phase"}, "of: expected all, impact_time, impact_velocity"),
+        *(
+            ({"tolerance": given}, f"tolerance: expected a relative error > 0, got {given!r}")
+            for given in (0.0, math.nan, math.inf, "1e-6")
+        ),
+        (
+            {"tolerance": 1e-20},
+            r"tolerance: expected a relative error of 1\.4e-14 or more, as double precision has it, got 1e-20",
+        ),
+        *(
+            ({"budget": given}, f"budget: expected a time > 0, in s, got {given!r}")
+            for given in (0.0, -1.0, math.nan, math.inf, None)
+        ),
+        ({"path": "nowhere/study.nc"}, "expected a place where a file can be written, got no folder"),
+        ({"path": "."}, "expected a place where a file can be written, got a folder"),
+    ],
+)
+def test_what_the_arguments_alone_show_is_refused_before_anything_runs(
+    monkeypatch: pytest.MonkeyPatch, arguments: dict[str, Any], message: str
+) -> None:
+    let_nothing_run(monkeypatch)
+    modes = STRIP | {"body": STRIP["body"] | {"modes": "auto"}, "execution": {"tolerance": 1e-3}}
+    with pytest.raises(UsageError, match=message):
+        vi.accuracy(modes | {"stop": [SOFT]}, **arguments)
+
+
+def test_a_tolerance_below_what_the_reference_is_known_to_is_refused_before_any_way_runs() -> None:
+    scene = Scene.from_dict(FREE)
+    known = error_of_reference(reference_of(studied_scene(scene)), "all")
+    tried: list[Measured] = []
+    with pytest.raises(
+        UsageError, match=r"expected a relative error of .*e-14 or more, to which the reference"
+    ):
+        study_accuracy(scene, tolerance=0.9 * known, told=tried.append)
+    assert not tried
+
+
+def test_a_tolerance_that_no_way_reaches_says_what_was_reached(rigid: Study) -> None:
+    missed = replace(rigid, tolerance=1e-15, chosen=None)
+    with pytest.raises(
+        UsageError, match=r"got 1e-15; reached was .*e-1.* by .*, the reference known to .e-1"
+    ):
+        refuse_unreached(missed)
+
+
+def test_misuse_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    let_nothing_run(monkeypatch)
     stop = {"law": "kelvin_voigt", "position": 1.0, "stiffness": 1e3, "damping": 1.0, "relaxation_time": 0.1}
     body = {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": [1.0, 1.0]}
     alone = P11 | {
@@ -497,9 +558,7 @@ def test_misuse_is_told() -> None:
     with pytest.raises(UsageError, match="expected a relative error > 0, got -1"):
         vi.accuracy(P11, tolerance=-1.0)
     with pytest.raises(UsageError, match="expected a scene with something to vary"):
-        vi.accuracy(alone, budget=1.0)
-    with pytest.raises(UsageError, match=r"got 1e-20; reached was .*e-1.* by "):
-        vi.accuracy(FREE, tolerance=1e-20, budget=1.0)
+        vi.accuracy(alone)
 
 
 def test_a_body_that_starts_on_its_stop_is_disturbed_to_the_free_side() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.places import EXAMPLES
+from support.still_clock import let_nothing_run, stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
@@ -69,6 +70,12 @@ def test_what_is_kept_changes_no_motion_and_what_moves_does(monkeypatch: pytest.
     assert all(share.seconds.shape == (2,) for share in shares.values())
 
 
+def test_a_dataset_that_has_no_place_is_refused_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    let_nothing_run(monkeypatch)
+    with pytest.raises(UsageError, match="expected a place where a file can be written, got no folder"):
+        vi.effects(BEAM, "nowhere/parts.nc")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tolerance"),
@@ -95,7 +102,10 @@ def test_effects_of_a_general_scene_are_its_components_samples_contacts_and_even
     assert found == ["samples", *(f"component ball{k}" for k in range(1, 6)), *contacts]
 
 
-def test_a_component_is_taken_away_with_all_that_joins_it_and_the_others_are_compared() -> None:
+def test_a_component_is_taken_away_with_all_that_joins_it_and_the_others_are_compared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stop_the_clock(monkeypatch)
     scene = load_scene(EXAMPLES / "two_oscillators.toml", ["record.recorded_time=20"])
     effect = next(one for one in effects_of(scene) if one.name == "component b")
     assert effect.without.general is not None

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.quick_studies import BUDGET, run_once
+from support.still_clock import NEVER_LATE, stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError, UsageError
@@ -269,7 +269,8 @@ def test_the_estimated_error_of_modes_holds_against_64(
         assert error_of(scene, found.modes) <= 2.0 * found.error
 
 
-def test_effects_draw_how_the_modes_that_were_found_converge() -> None:
+def test_effects_draw_how_the_modes_that_were_found_converge(monkeypatch: pytest.MonkeyPatch) -> None:
+    stop_the_clock(monkeypatch)
     found = vi.effects(strip())
     figure = vi.draw(found)
     bars, convergence = figure.axes
@@ -282,11 +283,11 @@ def test_effects_draw_how_the_modes_that_were_found_converge() -> None:
 def test_a_study_of_accuracy_tells_other_numbers_of_modes_by_the_most(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    run_once(monkeypatch)
-    for slow in ("_coupled", "_revised", "_plain_steps"):  # which are not asked about
+    stop_the_clock(monkeypatch)
+    for slow in ("_coupled", "_revised", "_integrated"):  # which are not asked about
         monkeypatch.setattr(f"vibroimpact.orchestrator.study.ways.{slow}", lambda scene: [])
-    monkeypatch.setattr("vibroimpact.orchestrator.study.ways.INTEGRATOR_TOLERANCES", (1e-4,))
-    found = vi.accuracy(strip(**{"record.recorded_periods": 5}), budget=BUDGET)
+    monkeypatch.setattr("vibroimpact.orchestrator.study.ways.STEPS_A_PERIOD", (23,))
+    found = vi.accuracy(strip(**{"record.recorded_periods": 5}), budget=NEVER_LATE)
     assert "32 modes, residual vectors among them" in found.attrs["modes_reference"]
     modes = found.where(found.name == "modes", drop=True)
     errors = dict(zip(modes.setting.values.tolist(), modes.error.values.tolist(), strict=True))

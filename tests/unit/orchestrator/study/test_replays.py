@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.quick_studies import BUDGET, run_once
 from support.replay_scenes import BOARD, channel, pulse, written
+from support.still_clock import NEVER_LATE, stop_the_clock
 
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
@@ -40,8 +40,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 @pytest.fixture(scope="module")
 def study(scene: Scene) -> Study:
     with pytest.MonkeyPatch.context() as patch:
-        run_once(patch)
-        return study_accuracy(scene, budget=BUDGET)
+        stop_the_clock(patch)
+        return study_accuracy(scene, budget=NEVER_LATE)
 
 
 def test_the_modes_that_the_truth_has_account_for_all_of_the_recording(study: Study) -> None:
@@ -93,7 +93,10 @@ def test_a_replay_without_a_recording_is_one_error() -> None:
         study_accuracy(parse_scene(BOARD, "board.toml"))
 
 
-def test_damping_drive_and_sensor_of_a_replay_are_effects(scene: Scene) -> None:
+def test_damping_drive_and_sensor_of_a_replay_are_effects(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop_the_clock(monkeypatch)
     effects = effects_of(scene)
     assert [effect.asked_by for effect in effects] == ["body.damping_ratio", "replay.drive", "sensor.gain"]
     changes = {share.effect.asked_by: share.change for share in shares_of(scene, effects)}

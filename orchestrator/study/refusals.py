@@ -1,0 +1,79 @@
+"""Requests that a study of accuracy refuses before it measures anything."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Real
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.choice import error_of_reference
+from vibroimpact.orchestrator.study.errors import QUANTITIES
+from vibroimpact.orchestrator.study.references import ROUNDING, SAFETY, Reference
+from vibroimpact.orchestrator.study.way import Way
+
+LEAST_TOLERANCE = SAFETY * ROUNDING
+"""Relative error, 1.4e-14, below which no reference of double precision is known: each counts so much for rounding."""
+
+
+def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None:
+    """Raise UsageError unless the arguments alone can be met.
+
+    Parameters
+    ----------
+    tolerance : float or None
+        Relative error that is asked for.
+    quantity : str
+        One of `errors.QUANTITIES`, or `all`.
+    budget : float
+        Wall time, s.
+
+    Raises
+    ------
+    UsageError
+
+    Examples
+    --------
+    >>> refuse_misuse(1e-6, "all", 40.0)
+    >>> refuse_misuse(1e-6, "all", -1.0)
+    Traceback (most recent call last):
+    vibroimpact.fmus.errors.UsageError: budget: expected a time > 0, in s, got -1.0.
+    """
+    if quantity not in ("all", *QUANTITIES):
+        raise UsageError(f"{option('of')}: expected all, {', '.join(QUANTITIES)}, got {quantity!r}.")
+    if not _is_between(0.0, budget):
+        raise UsageError(f"{option('budget')}: expected a time > 0, in s, got {budget!r}.")
+    if tolerance is None:
+        return
+    if not _is_between(0.0, tolerance):
+        raise UsageError(f"{option('tolerance')}: expected a relative error > 0, got {tolerance!r}.")
+    if tolerance < LEAST_TOLERANCE:
+        _refuse_tolerance(tolerance, LEAST_TOLERANCE, "as double precision has it")
+
+
+def refuse_one_way(ways: Sequence[Way], scene: Scene) -> None:
+    """Raise UsageError unless a scene has two ways at least that are no other models."""
+    if len([way for way in ways if not way.model]) < 2:
+        raise UsageError(
+            f"{scene.source}: expected a scene with something to vary (stops, or components that exchange values), "
+            "got one that is simulated in one way. It is exact."
+        )
+
+
+def refuse_vague_reference(tolerance: float | None, quantity: str, reference: Reference) -> None:
+    """Raise UsageError where a tolerance is below the error of the reference, which no way can get under."""
+    known = error_of_reference(reference, quantity)
+    if tolerance is not None and tolerance < known:
+        _refuse_tolerance(tolerance, known, "to which the reference is known")
+
+
+def _is_between(low: float, value: object) -> bool:
+    return isinstance(value, Real) and low < float(value) < math.inf
+
+
+def _refuse_tolerance(tolerance: float, least: float, why: str) -> None:
+    raise UsageError(
+        f"{option('tolerance')}: expected a relative error of {least:.1e} or more, {why}, got {tolerance:g}."
+    )

@@ -1,0 +1,58 @@
+"""A clock that stands still: studies whose tests ask for errors, texts or files run each way once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import pytest
+
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study import clock
+from vibroimpact.orchestrator.study.clock import Clock
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.replays import ReplayTrial
+from vibroimpact.orchestrator.study.way import SceneTrial, Trial, Way
+
+RUN = 1e-3
+"""Time that each run is said to take, s."""
+NEVER_LATE = 1e4
+"""Budget of which no run takes so large a part that it is given up, however busy the machine is, s."""
+
+
+class StillClock(Clock):
+    """Measures nothing: no run is repeated, and each takes the same time."""
+
+    def now(self) -> float:
+        """Return the same instant each time: no budget is spent."""
+        return 0.0
+
+    def wall_time(self, trial: Trial) -> float:
+        """Return the time of any run, s."""
+        return RUN
+
+    def processor_time(self, trial: SceneTrial | ReplayTrial) -> float:
+        """Return the time of any run, s."""
+        return RUN
+
+    def calls(self, way: Way) -> int:
+        """Return that nobody counts them."""
+        return -1
+
+    def memory(self, scene: Scene, given: Mapping[str, float], places: Sequence[int]) -> dict[int, int]:
+        """Return that nobody measures it."""
+        return {}
+
+
+def let_nothing_run(patch: pytest.MonkeyPatch) -> None:
+    """Let each run of a scene be an error until the patch is undone."""
+
+    def run(trial: Trial) -> Observation:
+        raise AssertionError("a scene has run")
+
+    for kind in (SceneTrial, ReplayTrial):
+        patch.setattr(kind, "run", run)
+
+
+def stop_the_clock(patch: pytest.MonkeyPatch) -> None:
+    """Let studies measure nothing until the patch is undone."""
+    patch.setattr(clock, "CLOCK", StillClock())
