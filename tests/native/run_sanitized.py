@@ -1,24 +1,36 @@
 """Runs every C test of this folder under the sanitizers that the compiler at hand supports.
 
-Each `*.c` here is a program of its own, linked with the whole core; it passes when it exits with 0.
+Each `*.c` here is a program of its own, linked with the whole core; it passes when it exits with 0. Objects and
+programs are kept by the content of their sources, of all headers and of the compiler; programs run each time.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers
-from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, find_compiler
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from support.kept import compiler_identity, content_of, digest, kept, remove_unused
+from support.places import ROOT
 
-HERE = Path(__file__).parent
+from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers, is_part
+from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, find_compiler
+from vibroimpact.fmus.packaging.description import read_component
+
+HERE = Path(__file__).resolve().parent
+KEPT = ROOT / "build" / "sanitized"
 SANITIZERS = ("address", "undefined")
 PROBE = "int main(int count, char **names) { (void)names; return count - 1; }\n"
+#: Tests that run for the longest, and begin first.
+LONGEST = ("one_mode.c", "budget.c", "pressed_flow.c")
 #: Longest that one test may take under the sanitizers, s.
 LIMIT = 600.0
 #: Tests of bodies of one mode, which run on a core that is compiled for them, as the Oscillator's is.
@@ -27,74 +39,144 @@ ONE_MODE = ("-DVI_MODES=2", "-DVI_PORTS=2", "-DVI_ONLY_MODES=1")
 ENVIRONMENT = {**os.environ, "UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=1"}
 
 
-def supported(compiler: Sequence[str], sanitizer: str, folder: Path) -> bool:
-    """Return whether a program with this sanitizer compiles, links and runs here."""
-    source, program = folder / "probe.c", folder / "probe"
-    source.write_text(PROBE, encoding="ascii")
-    command = [*compiler, f"-fsanitize={sanitizer}", str(source), "-o", str(program)]
-    compiled = subprocess.run(command, capture_output=True)
-    return compiled.returncode == 0 and subprocess.run([str(program)], capture_output=True).returncode == 0
+@dataclass(frozen=True)
+class Toolchain:
+    """Compiler, options and headers of one kind of core."""
+
+    compiler: tuple[str, ...]
+    options: tuple[str, ...]
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of all that decides about an object but its source."""
+        headers = [*NATIVE.rglob("*.h"), *HERE.glob("*.h"), *fmi_headers().glob("*.h")]
+        return digest(compiler_identity(self.compiler), *self.options, content_of(headers))
+
+    def compile(self, *arguments: str | Path) -> None:
+        """Run the compiler; a CalledProcessError has its words."""
+        command = [*self.compiler, *self.options, *map(str, arguments)]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+
+    def object_of(self, source: Path) -> Path:
+        """Return the object of a source of the core."""
+        key = digest(self.key, content_of([source]))
+        return kept(f"{source.stem}.o", key, lambda path: self.compile("-c", source, "-o", path), KEPT)
+
+    def program_of(self, test: Path, core: Sequence[Path]) -> Path:
+        """Return the program of a test, linked with the objects of the core."""
+        beside_core = [path for path in NATIVE.rglob("*.c") if NATIVE / "core" not in path.parents]
+        key = digest(self.key, content_of([test, *beside_core]), *(path.name for path in core))
+        return kept(test.stem, key, lambda path: self.compile(test, *core, "-o", path, "-lm"), KEPT)
 
 
-def options_for(sanitizers: Sequence[str]) -> list[str]:
+def supported(compiler: Sequence[str], sanitizers: Sequence[str]) -> bool:
+    """Return whether a program with these sanitizers compiles, links and runs here."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, program = Path(folder, "probe.c"), Path(folder, "probe")
+        source.write_text(PROBE, encoding="ascii")
+        command = [*compiler, f"-fsanitize={','.join(sanitizers)}", str(source), "-o", str(program)]
+        compiled = subprocess.run(command, capture_output=True)
+        return compiled.returncode == 0 and subprocess.run([program], capture_output=True).returncode == 0
+
+
+def supported_sanitizers(compiler: Sequence[str]) -> tuple[str, ...]:
+    """Return the sanitizers that work here; say of the others that they do not."""
+    if supported(compiler, SANITIZERS):
+        return SANITIZERS
+    found = tuple(sanitizer for sanitizer in SANITIZERS if supported(compiler, [sanitizer]))
+    for missing in sorted(set(SANITIZERS) - set(found)):
+        print(f"SKIPPED: the {missing} sanitizer, which {' '.join(compiler)} does not have here")
+    return found
+
+
+def options_for(sanitizers: Sequence[str]) -> tuple[str, ...]:
     """Return the options that the core and the tests are compiled with."""
     options = [*LANGUAGE, *WARNINGS, "-Werror", "-g", "-O1"]
     options += [f"-I{folder}" for folder in (NATIVE / "core", NATIVE / "adapters", fmi_headers())]
     if sanitizers:
         options += [f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover=all"]
-    return options
+    return tuple(options)
 
 
-def compile_core(compiler: Sequence[str], options: Sequence[str], folder: Path) -> list[Path] | None:
-    """Compile the core, which tests share, side by side on all processors; None if that fails."""
-    folder.mkdir()
-    sources = sorted((NATIVE / "core").rglob("*.c"))
-    objects = [folder / f"{source.stem}.o" for source in sources]
-
-    def compiles(source: Path, target: Path) -> bool:
-        return subprocess.run([*compiler, *options, "-c", str(source), "-o", str(target)]).returncode == 0
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return objects if all(pool.map(compiles, sources, objects)) else None
+def core_sources(of_one_mode: bool) -> list[Path]:
+    """Return the sources of the core; for one mode, those that the Oscillator has."""
+    oscillator = read_component(NATIVE / "oscillator" / "variables.toml")
+    core = NATIVE / "core"
+    return [
+        path
+        for path in sorted(core.rglob("*.c"))
+        if not of_one_mode or is_part(oscillator, path.relative_to(core))
+    ]
 
 
-def run(
-    test: Path, compiler: Sequence[str], options: Sequence[str], core: Sequence[Path], folder: Path
-) -> bool:
-    """Compile and run one test; return whether it passed."""
-    program = folder / test.stem
-    command = [*compiler, *options, str(test), *map(str, core), "-o", str(program), "-lm"]
-    if subprocess.run(command).returncode != 0:
-        return False
-    return subprocess.run([str(program)], timeout=LIMIT, env=ENVIRONMENT).returncode == 0
+def run(program: Path, name: str) -> None:
+    """Run a program; it finds itself in a folder of its own, where it may write."""
+    with tempfile.TemporaryDirectory() as folder:
+        itself = str(Path(folder, name))
+        subprocess.run(
+            [itself],
+            executable=program,
+            check=True,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=LIMIT,
+            env=ENVIRONMENT,
+        )
 
 
-def main() -> int:
-    """Run all; return 1 if one failed."""
+def failure(test: Path, tools: Toolchain, core: Sequence[Path]) -> str:
+    """Compile and run one test; return what went wrong, empty where it passed."""
+    try:
+        run(tools.program_of(test, core), test.stem)
+    except subprocess.CalledProcessError as error:
+        return f"exit code {error.returncode}\n{error.stdout}{error.stderr}"
+    except subprocess.TimeoutExpired:
+        return f"not at its end after {LIMIT:g} s"
+    return ""
+
+
+def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count(), help="programs at once, of the compiler and of tests"
+    )
+    return parser.parse_args(arguments)
+
+
+def in_order(tests: Iterable[Path]) -> list[Path]:
+    """Return the tests in the order in which they begin: the longest first, then by name."""
+    return sorted(tests, key=lambda test: (test.name not in LONGEST, test.name))
+
+
+def run_all(pool: ThreadPoolExecutor, compiler: tuple[str, ...], sanitizers: Sequence[str]) -> list[str]:
+    """Compile and run all tests, a line for each as it ends; return the names of those that failed."""
+    options, failed = options_for(sanitizers), []
+    tools = {False: Toolchain(compiler, options), True: Toolchain(compiler, (*options, *ONE_MODE))}
+    objects = {kind: pool.map(tools[kind].object_of, core_sources(kind)) for kind in tools}
+    cores = {kind: list(found) for kind, found in objects.items()}
+    running = {}
+    for test in in_order(HERE.glob("*.c")):
+        kind = test.name in OF_ONE_MODE
+        running[pool.submit(failure, test, tools[kind], cores[kind])] = test.name
+    for future in as_completed(running):
+        name, wrong = running[future], future.result()
+        kinds = ", ".join(sanitizers) or "no sanitizer"
+        print(f"{name} ({kinds}): {f'FAILED: {wrong}' if wrong else 'passed'}", flush=True)
+        failed += [name] if wrong else []
+    return failed
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run all; return 1 if one failed, or the core does not compile."""
     compiler = find_compiler()
-    failed = []
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        sanitizers = [s for s in SANITIZERS if supported(compiler, s, folder)]
-        for missing in sorted(set(SANITIZERS) - set(sanitizers)):
-            print(f"SKIPPED: the {missing} sanitizer, which {' '.join(compiler)} does not have here")
-        options = options_for(sanitizers)
-        cores = {
-            only_one: (sizes, compile_core(compiler, [*options, *sizes], folder / f"core{len(sizes)}"))
-            for only_one, sizes in ((False, ()), (True, ONE_MODE))
-        }
-
-        def passes(test: Path) -> bool:
-            sizes, core = cores[test.name in OF_ONE_MODE]
-            return core is not None and run(test, compiler, [*options, *sizes], core, folder)
-
-        tests = sorted(HERE.glob("*.c"))
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            results = pool.map(passes, tests)
-            for test, passed in zip(tests, results, strict=True):
-                kinds, result = ", ".join(sanitizers) or "no sanitizer", "passed" if passed else "FAILED"
-                print(f"{test.name} ({kinds}): {result}")
-                failed += [] if passed else [test.name]
+    with ThreadPoolExecutor(parsed(arguments).jobs) as pool:
+        try:
+            failed = run_all(pool, compiler, supported_sanitizers(compiler))
+        except subprocess.CalledProcessError as error:
+            print(f"FAILED: the core does not compile\n{error.stderr}")
+            return 1
+    remove_unused(KEPT)
     return 1 if failed else 0
 
 
