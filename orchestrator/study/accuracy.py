@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.analysis.dataset.results import Rows, described
 from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study import clock
 from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.analysis.dataset.results import Rows, described
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
@@ -23,7 +24,6 @@ from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import DAMPING
 from vibroimpact.orchestrator.scene.summary import effects as called_effects
 from vibroimpact.orchestrator.scene.summary import laws
-from vibroimpact.orchestrator.study import clock
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
 from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
 from vibroimpact.orchestrator.study.references import scales_of

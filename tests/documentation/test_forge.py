@@ -29,7 +29,7 @@ def steps() -> list[dict[str, Any]]:
 def test_the_workflow_calls_targets_of_the_makefile_and_extras_that_are_there() -> None:
     commands = [step["run"] for step in steps() if "run" in step]
     made = {target for command in commands for target in re.findall(r"^make (\w+)$", command, re.MULTILINE)}
-    assert made == {"test", "oldest", "lint", "docs"}
+    assert made == {"test", "oldest", "lint", "docs", "soak"}
     assert made <= TARGETS
     for command in commands:
         for extra in re.findall(r"\.\[(\w+)\]", command):
@@ -46,6 +46,14 @@ def test_the_workflow_asks_for_pythons_that_the_package_allows_the_oldest_among_
     assert PROJECT["requires-python"] == ">=3.11"
     assert {f"3.{minor}" for minor in range(11, 15)} <= asked
     assert jobs["untried"]["continue-on-error"] is True
+
+
+def test_long_series_run_each_week_and_no_push_waits_for_them() -> None:
+    workflow = read(WORKFLOW)
+    # YAML takes the word for a truth
+    assert workflow[True]["schedule"] == [{"cron": "17 2 * * 6"}]
+    assert workflow["jobs"]["soak"]["if"] == "github.event_name == 'schedule'"
+    assert {"run": "make soak", "env": {"MINUTES": 240}} in workflow["jobs"]["soak"]["steps"]
 
 
 def test_the_workflow_may_read_only() -> None:
