@@ -260,7 +260,10 @@ def test_a_clock_that_drifts_is_hinted_at_and_found_when_asked_for():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("ratio", "stop", "restitution"), [(0.69, -0.2, 0.66), (0.72, 0.0, 0.8)])
+@pytest.mark.parametrize(
+    ("ratio", "stop", "restitution"),
+    [(0.69, -0.2, 0.66), pytest.param(0.72, 0.0, 0.8, marks=pytest.mark.long)],
+)
 def test_forcing_below_resonance_is_estimated(ratio, stop, restitution):
     # several flights in a period of the force: what suits that period is longer than they are
     parameters = replace(

@@ -20,11 +20,14 @@ def oscillator(frequency: float, force: float) -> ImpactingBody:
     )
 
 
-def points_on_a_branch(force: float, start: float) -> list[SpecialPoint]:
-    settings = FollowSettings(0.7, 2.2, 0.03)
-    follower = Follower(lambda value: oscillator(value, force), settings)
-    branch: Branch = follower.branch(closed_form(oscillator(start, force))[0], start)
-    return branch.points
+@pytest.fixture(scope="module")
+def points() -> dict[str, SpecialPoint]:
+    """Return the special points of a branch at a force of .3, by their kind."""
+    follower = Follower(lambda value: oscillator(value, 0.3), FollowSettings(0.7, 2.2, 0.03))
+    branch: Branch = follower.branch(closed_form(oscillator(1.1, 0.3))[0], 1.1)
+    kinds = [point.kind for point in branch.points]
+    assert kinds.count("period doubling") == kinds.count("fold") == 1
+    return dict(zip(kinds, branch.points, strict=True))
 
 
 def locus_to(frequency: float, point: SpecialPoint, force: float) -> Locus:
@@ -34,9 +37,8 @@ def locus_to(frequency: float, point: SpecialPoint, force: float) -> Locus:
     return LocusFollower(oscillator, reach, FollowSettings(0.01, 3.0)).locus(point, (point.at.value, force))
 
 
-def test_a_period_doubling_goes_through_the_explicit_one() -> None:
-    (doubling,) = [point for point in points_on_a_branch(0.3, 1.1) if point.kind == "period doubling"]
-    ends = locus_to(0.88, doubling, 0.3)
+def test_a_period_doubling_goes_through_the_explicit_one(points: dict[str, SpecialPoint]) -> None:
+    ends = locus_to(0.88, points["period doubling"], 0.3)
     met = [
         each for each in (ends.points[0], ends.points[-1]) if each.values[0] == pytest.approx(0.88, abs=1e-12)
     ]
@@ -45,9 +47,8 @@ def test_a_period_doubling_goes_through_the_explicit_one() -> None:
     assert met[0].orbit.multipliers[0] == pytest.approx(-1.0, abs=1e-9)
 
 
-def test_a_fold_goes_through_the_explicit_one() -> None:
-    (fold,) = [point for point in points_on_a_branch(0.3, 1.1) if point.kind == "fold"]
-    ends = locus_to(1.35, fold, 0.3)
+def test_a_fold_goes_through_the_explicit_one(points: dict[str, SpecialPoint]) -> None:
+    ends = locus_to(1.35, points["fold"], 0.3)
     met = [
         each for each in (ends.points[0], ends.points[-1]) if each.values[0] == pytest.approx(1.35, abs=1e-12)
     ]
@@ -55,8 +56,7 @@ def test_a_fold_goes_through_the_explicit_one() -> None:
     assert met[0].orbit.velocities[0] == pytest.approx(0.914676801783975, abs=1e-10)
 
 
-def test_folds_and_doublings_end_at_the_points_of_codimension_two() -> None:
-    points = {point.kind: point for point in points_on_a_branch(0.3, 1.1)}
+def test_folds_and_doublings_end_at_the_points_of_codimension_two(points: dict[str, SpecialPoint]) -> None:
     follower = LocusFollower(oscillator, FollowSettings(0.3, 2.2, 0.03), FollowSettings(0.01, 1.5))
     doubling = follower.locus(points["period doubling"], (points["period doubling"].at.value, 0.3))
     fold = follower.locus(points["fold"], (points["fold"].at.value, 0.3))

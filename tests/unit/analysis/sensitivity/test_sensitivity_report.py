@@ -56,6 +56,13 @@ def dataset() -> xr.Dataset:
     return ran(SCENE)
 
 
+@pytest.fixture(scope="module")
+def file(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("runs") / "runs.nc"
+    dataset.to_netcdf(path)
+    return path
+
+
 def test_the_range_at_resonance_has_the_indices_of_force_over_damping(dataset: xr.Dataset) -> None:
     found = sensitivity_report(dataset, seed=1)
     assert found.parameter.values.tolist() == ["amplitude", "damping"]
@@ -231,11 +238,7 @@ def test_the_command_prints_writes_and_draws(dataset: xr.Dataset, tmp_path: Path
         (["--figure", "s.gif"], "expected a name ending in .png"),
     ],
 )
-def test_a_wrong_option_is_one_line_and_exit_code_2(
-    dataset: xr.Dataset, tmp_path: Path, options: list[str], text: str
-):
-    file = tmp_path / "runs.nc"
-    dataset.to_netcdf(file)
+def test_a_wrong_option_is_one_line_and_exit_code_2(file: Path, options: list[str], text: str):
     result = in_this_process("sensitivity", file, *options)
     assert result.returncode == 2
     assert text in result.stderr

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -196,10 +197,11 @@ def test_a_campaign_that_dies_at_any_step_of_an_extension_goes_on(
     replace, unlink = os.replace, Path.unlink
     old, new = sweep(THREE, frequency(5)), sweep(frequency(9))
     campaign_here(monkeypatch, new, tmp_path / "new")
+    begun(monkeypatch, old, tmp_path / "begun", chunks=3)
     steps = 0
     while True:
         folder = tmp_path / str(steps)
-        begun(monkeypatch, old, folder, chunks=3)
+        shutil.copytree(tmp_path / "begun", folder)
         left = [steps]
 
         def counted(change: Callable[..., Any], left: list[int] = left) -> Callable[..., Any]:

@@ -16,10 +16,11 @@ from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, da
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, relative
 from vibroimpact.orchestrator.hard_cases.finding import first_root
 
-SLOW = {"many-modes", "samples", "elastic-million"}
+SLOW = {"samples", "elastic-million"}
+LONG = "many-modes"
 
 
-@pytest.mark.parametrize("name", [case.name for case in CASES if case.name not in SLOW])
+@pytest.mark.parametrize("name", [case.name for case in CASES if case.name not in {*SLOW, LONG}])
 def test_a_hard_case_holds(name: str) -> None:
     (found,) = measured_cases([name])
     assert found.is_met, f"{found.found.figure} above {found.case.bound} {found.failure}"
@@ -27,7 +28,7 @@ def test_a_hard_case_holds(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(SLOW))
+@pytest.mark.parametrize("name", [*sorted(SLOW), pytest.param(LONG, marks=pytest.mark.long)])
 def test_a_hard_case_that_takes_longer_holds(name: str) -> None:
     (found,) = measured_cases([name])
     assert found.is_met, f"{found.found.figure} above {found.case.bound} {found.failure}"

@@ -105,7 +105,7 @@ def test_a_chain_of_one_mass_has_the_points_of_the_oscillator() -> None:
         "[[stop]]\nposition = 1.0\nrestitution = 0.7\n[record]\nrecorded_periods = 2\n"
     )
     followed = Followed(vi.Scene.from_text(text), FREQUENCY)
-    follow_branches(followed.scene, FREQUENCY, 0.6, 1.6, followed=followed, doublings=0)
+    follow_branches(followed.scene, FREQUENCY, 0.6, 1.6, followed=followed, doublings=0, longest=0.05)
     found = sorted(point.at.value for branch in followed.branches for point in branch.points)
     expected = [0.7106873690939, 0.9364931207, 1.2185743569476, 1.5166110861]
     assert found == pytest.approx(expected, abs=1e-9)

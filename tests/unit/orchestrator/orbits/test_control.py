@@ -64,7 +64,7 @@ def test_without_corrections_it_is_lost_where_its_period_doubles() -> None:
     assert not loose.correction.values.any()
 
 
-@pytest.mark.parametrize("law", ["deadbeat", "newton"])
+@pytest.mark.parametrize("law", [pytest.param("deadbeat", marks=pytest.mark.long), "newton"])
 def test_other_laws_keep_it_as_well(law: str) -> None:
     found = kept(law=law)
     assert found.attrs["kept_to"] - GRAZE < THESIS

@@ -65,6 +65,7 @@ def test_a_branch_is_followed_once_however_far_its_orbits_lie_apart(longest: flo
     assert [branch.name for branch in found.branches] == ["P(1,1)"]
 
 
+@pytest.mark.long
 def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_of_these_grazes() -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372, PARAMETER: 1.75})
     branches = follow_branches(scene, PARAMETER, 1.6, 2.2, longest=0.05)

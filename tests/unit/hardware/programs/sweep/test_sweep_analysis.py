@@ -91,7 +91,7 @@ def test_a_period_with_a_lost_sample_has_no_extrema_and_the_others_have() -> Non
 def test_steps_are_cut_by_sample_numbers_however_the_blocks_come(
     sizes: list[int], data: st.DataObject
 ) -> None:
-    settings = sweep_of([18.0, 19.0], path="up-down", transient_periods=2)
+    settings = sweep_of([180.0, 190.0], path="up-down", transient_periods=2)
     plan = planned(settings)
     lost = data.draw(st.integers(0, len(sizes)))
     collector, found, first, missing, seen = StepCollector(plan, 1), [], 0, set(), 0
