@@ -9,6 +9,8 @@ from __future__ import annotations
 import ast
 import tomllib
 from collections import Counter
+from collections.abc import Iterator
+from functools import cache
 from html import escape
 from pathlib import Path
 
@@ -34,10 +36,18 @@ def modules() -> dict[str, Path]:
     return found
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements within a node, at any depth, and no expressions, which are most of a tree."""
+    for block in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for statement in getattr(node, block, ()):
+            yield statement
+            yield from statements(statement)
+
+
 def imported_names(path: Path) -> set[str]:
     """Return the modules of ours that a file imports, and what could be modules, without `vibroimpact`."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
@@ -45,8 +55,9 @@ def imported_names(path: Path) -> set[str]:
     return {name.removeprefix(PREFIX) for name in found if name.startswith(PREFIX)}
 
 
+@cache
 def imports() -> dict[str, set[str]]:
-    """Return for every module those that it imports."""
+    """Return for every module those that it imports; all files are read once in a process."""
     known = modules()
     return {name: imported_names(path) & set(known) - {name} for name, path in known.items()}
 

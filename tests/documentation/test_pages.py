@@ -7,6 +7,7 @@ import importlib.util
 import re
 import shlex
 import sys
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -52,10 +53,16 @@ def commands_of(text: str) -> list[str]:
     return [line for line in lines if line.startswith("vibroimpact ")]
 
 
+@cache
+def command_line() -> Any:
+    """Return all commands, made of their functions once: that takes a tenth of a second."""
+    load_commands()
+    return typer.main.get_command(app)
+
+
 def understood(command: str) -> None:
     """Let the command line parse a command; nothing is run."""
-    load_commands()
-    chosen: Any = typer.main.get_command(app)
+    chosen = command_line()
     words = shlex.split(command)
     context = chosen.context_class(chosen, info_name=words.pop(0))
     while hasattr(chosen, "get_command"):
