@@ -91,7 +91,7 @@ def supported_sanitizers(compiler: Sequence[str]) -> tuple[str, ...]:
 
 def options_for(sanitizers: Sequence[str]) -> tuple[str, ...]:
     """Return the options that the core and the tests are compiled with."""
-    options = [*LANGUAGE, *WARNINGS, "-Werror", "-g", "-O1"]
+    options = [*LANGUAGE, *WARNINGS, "-Werror", "-g1", "-O1"]
     options += [f"-I{folder}" for folder in (NATIVE / "core", NATIVE / "adapters", fmi_headers())]
     if sanitizers:
         options += [f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover=all"]
