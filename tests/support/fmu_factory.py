@@ -1,6 +1,6 @@
 """FMUs that the test suite makes itself, from the C in `tests/support/fmus`: other people's FMUs, good and bad.
 
-They share nothing with the package's own C. Each is compiled once in a process, in a fraction of a second;
+They share nothing with the package's own C. Each is compiled once for each content of its sources and compiler;
 asking again only writes the file.
 """
 
@@ -9,11 +9,12 @@ from __future__ import annotations
 import re
 import tempfile
 import uuid
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
+from support.kept import compiler_identity, content_of, digest, kept
 from vibroimpact.fmus.packaging.build import fmi_headers
-from vibroimpact.fmus.packaging.compiler import compile_library
+from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, compile_library, find_compiler
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
@@ -92,17 +93,24 @@ def _token(name: str, fmi: str) -> str:
 
 @cache
 def _binary(name: str, fmi: str) -> bytes:
-    adapter = SOURCES / f"fmi{fmi[0]}.c"
+    adapter, suffix = SOURCES / f"fmi{fmi[0]}.c", library_suffix()
+    headers = [*SOURCES.glob("*.h"), *fmi_headers().glob("*.h")]
+    key = digest(
+        *(compiler_identity(find_compiler()), *LANGUAGE, *WARNINGS, _token(name, fmi)),
+        content_of([Path(__file__), adapter, SOURCES / MODELS[name], *headers]),
+    )
+    return kept(f"{name}.fmi{fmi[0]}{suffix}", key, partial(_compile, name, fmi, adapter)).read_bytes()
+
+
+def _compile(name: str, fmi: str, adapter: Path, library: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         generated = Path(folder)
         (generated / "token.h").write_text(f'#define TOKEN "{_token(name, fmi)}"\n', encoding="ascii")
         rest = generated / "rest.c"
         rest.write_text(_functions_left_out(adapter, fmi), encoding="ascii")
-        library = generated / f"{name}{library_suffix()}"
         # not strict: the headers' own empty parameter lists are a warning for some compilers
         sources = [adapter, SOURCES / MODELS[name], rest]
         compile_library(library, sources, [SOURCES, generated, fmi_headers()], export_all=True, strict=False)
-        return library.read_bytes()
 
 
 def _functions_left_out(adapter: Path, fmi: str) -> str:
