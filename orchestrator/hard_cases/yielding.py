@@ -60,7 +60,7 @@ def _hunt_crossley() -> Found:
 
         expected = brentq(off, 1e-12, min(1.0, (1.0 - 1e-13) / product), xtol=1e-16)
         worst = 0.0
-        for exponent in (1.0, 1.5, 2.5):
+        for exponent in (1.0, 1.5, 2.0, 2.5):
             stop = {
                 **{"law": "hunt_crossley", "position": 0.0, "stiffness": 1e4, "exponent": exponent},
                 "damping": float(product),

@@ -65,7 +65,7 @@ def ran(scene: Scene, how: str = "auto") -> RunRecord:
         runner.close()
 
 
-@pytest.mark.parametrize("case", LONG_STEPS)
+@pytest.mark.parametrize("case", ["stiff dashpot, nearly plastic", "light beam"])
 def test_the_deadline_is_kept_within_one_step(case: str) -> None:
     record = ran(changed(*LONG_STEPS[case], f"deadline = {DEADLINE}"))
     assert record.outcome == Outcome.timeout

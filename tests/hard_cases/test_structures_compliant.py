@@ -50,22 +50,6 @@ def test_ever_stiffer_stops_tend_to_restitution_in_proportion_to_the_contact_tim
         assert coarse / fine == pytest.approx(1000.0**power, rel=0.1)
 
 
-@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 2.5])
-@pytest.mark.parametrize("p", [0.01, 0.1, 0.5, 1.0, 3.0])
-def test_hunt_crossley_rebounds_as_its_implicit_formula_whatever_the_exponent(
-    exponent: float, p: float
-) -> None:
-    # p (1 + e) = ln((1 + p) / (1 - p e)): equations.md 6.10
-    def residual(e: float) -> float:
-        return p * (1.0 + e) - math.log((1.0 + p) / (1.0 - p * e))
-
-    e = brentq(residual, 1e-9, min(1.0, (1.0 - 1e-12) / p), xtol=1e-15)
-    stop = Stop([1.0], 0.1, law="hunt_crossley", stiffness=1e4, damping=p / 0.8, exponent=exponent)
-    with Structure(Modes([0.0]), [stop], 0.0, 0.8, tolerance=1e-11) as body:
-        body.advance(5.0)
-        assert body.impacts[0, 6] == pytest.approx(e, rel=1e-9)
-
-
 @pytest.mark.parametrize("position", [0.0, 0.1, 1.0])
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
 def test_a_power_law_rebounds_to_its_tolerance_or_the_rounding_of_its_depth(
@@ -243,7 +227,7 @@ def test_a_spring_stop_in_contact_is_the_stiffer_oscillator() -> None:
         assert body.impacts[0, 4] == pytest.approx(99.0 * 0.1 * 2.0 / 10.0, rel=1e-13)
 
 
-@pytest.mark.parametrize("law", ["kelvin_voigt", "hertz", "hunt_crossley"])
+@pytest.mark.parametrize("law", ["hertz", "hunt_crossley"])
 @pytest.mark.parametrize("stiffness", [1.0, 1e4, 1e9])
 def test_every_touch_of_a_thousand_is_found_once_and_ends(law: str, stiffness: float) -> None:
     # undamped stops at both ends of a free flight: each contact turns the mass round and takes its time
