@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -21,24 +22,21 @@ GAUSSIAN_BITS = ["-0x1.050575a865c14p-2", "-0x1.aed98bd02a608p-1", "0x1.cb4a9a0d
 
 def seen_by_solver(natural: float, ratio: float, times: Array, hits: Array, impulses: Array) -> Array:
     """Return y of the load cell's equation by an eighth-order Runge-Kutta method, from pulse edge to pulse edge."""
-    w = 2.0 * np.pi * natural
-
-    def load(t: float, middle: float) -> float:
-        under_way = (hits < middle) & (middle < hits + DURATION)
-        peaks = impulses * np.pi / (2.0 * DURATION)
-        return float(np.sum((peaks * np.sin(np.pi * (t - hits) / DURATION))[under_way]))
-
+    w = 2.0 * math.pi * natural
+    pulses = list(zip(hits.tolist(), (impulses * np.pi / (2.0 * DURATION)).tolist(), strict=True))
     edges = np.unique([times[0], *hits, *(hits + DURATION), times[-1]])
     state, seen = np.zeros(2), np.zeros_like(times)
     for begin, end in pairwise(edges):
         middle = 0.5 * (begin + end)
-        run = solve_ivp(
-            lambda t, y, middle=middle: [
-                y[1],
-                w * w * (load(t, middle) - y[0]) - 2.0 * ratio * w * y[1],
-            ],
-            (begin, end), state, "DOP853", rtol=1e-13, atol=1e-13, dense_output=True,
-        )  # fmt: skip
+        under_way = [(hit, peak) for hit, peak in pulses if hit < middle < hit + DURATION]
+
+        def rate(t: float, y: Array, under_way: list[tuple[float, float]] = under_way) -> list[float]:
+            # Python's floats: the solver asks a hundred thousand times
+            load = sum(peak * math.sin(math.pi * (t - hit) / DURATION) for hit, peak in under_way)
+            place, speed = y.tolist()
+            return [speed, w * w * (load - place) - 2.0 * ratio * w * speed]
+
+        run = solve_ivp(rate, (begin, end), state, "DOP853", rtol=1e-13, atol=1e-13, dense_output=True)
         inside = (times >= begin) & (times <= end)
         seen[inside] = run.sol(times[inside])[0]
         state = run.y[:, -1]
