@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import xarray as xr
-from scipy.stats import t as student
 
 from vibroimpact.analysis.files.estimate_table import estimate_table
 from vibroimpact.analysis.recording.units import unit_label
@@ -50,6 +49,8 @@ class Estimate:
         >>> round(low, 3), round(high, 3)
         (1.804, 2.196)
         """
+        from scipy.stats import t as student
+
         half = float(student.ppf(0.5 + CONFIDENCE / 2, self.degrees_of_freedom)) * self.standard_error
         return self.value - half, self.value + half
 

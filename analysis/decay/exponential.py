@@ -6,14 +6,17 @@ First in windows of one period, which give the guess of frequency, decay rate an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
 
 from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.residuals import ResidualTest, coloured_covariance, residual_test
 from vibroimpact.analysis.decay.samples import DecaySamples, Floats, stretches
 from vibroimpact.fmus.errors import EstimationError
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 FEWEST_PERIODS = 2.0
 _MOST_GRID = 1 << 18
@@ -169,6 +172,8 @@ def fit_exponential(samples: DecaySamples, guess: FirstGuess | None = None) -> E
     EstimationError
         Nothing oscillates, or the fit does not settle.
     """
+    from scipy.optimize import least_squares
+
     guess = first_guess(samples) if guess is None else guess
     # Amplitude and phase are least correlated with rate and frequency at the start of the samples.
     time = samples.time - samples.time[0]

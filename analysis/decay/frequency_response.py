@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.signal import csd, get_window, welch
 
 from vibroimpact.analysis.decay.samples import Floats, clock_remark, unit_power
 from vibroimpact.analysis.recording import Channel, channel_of
@@ -102,6 +101,8 @@ def frequency_response(
     UsageError
         Unknown window, uneven sampling, or too few samples.
     """
+    from scipy.signal import csd, get_window, welch
+
     if window not in WINDOWS:
         raise UsageError(f'{option("window")}: expected one of {", ".join(WINDOWS)}, got "{window}".')
     drive, response = channel_of(drive), channel_of(response)

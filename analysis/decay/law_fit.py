@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares, nnls
 
 from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.exponential import Envelope, ExponentialDecay, first_guess, fit_exponential
@@ -16,6 +16,9 @@ from vibroimpact.analysis.decay.motion import Coefficients, decaying_motion
 from vibroimpact.analysis.decay.residuals import ResidualTest, coloured_covariance, residual_test
 from vibroimpact.analysis.decay.samples import DecaySamples, Floats, unit_power
 from vibroimpact.fmus.errors import EstimationError
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 CUBIC = "cubic"
 _STEP = 1e-6
@@ -167,6 +170,8 @@ def fit_law(
     EstimationError
         The fit runs into damping that ends the motion before the data do.
     """
+    from scipy.optimize import least_squares
+
     names = ("turning_time", "amplitude", "offset", "natural_angular_frequency", *law.terms)
     problem = _Problem(samples, start, names + (CUBIC,) * cubic)
     try:
@@ -193,6 +198,8 @@ def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Flo
 
     `dA/dt = -lambda A - 2 c / (pi omega) - 4 q omega A^2 / (3 pi)`, integrated once, is linear in all of them.
     """
+    from scipy.optimize import nnls
+
     time, size = envelope.time - problem.turning, envelope.amplitude / problem.size
     omega = problem.omega
     losses = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
 
 from vibroimpact.analysis.decay.samples import Floats
 
@@ -95,6 +94,8 @@ def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTe
     turn : float
         Phase of the oscillation per sample, rad: the test looks over two periods of it.
     """
+    from scipy.stats import chi2
+
     count = len(residual)
     lags = int(np.clip(4.0 * np.pi / turn, _FEWEST_LAGS, min(_MOST_LAGS, count // 4)))
     correlation = autocorrelation(residual, lags)
@@ -126,6 +127,8 @@ def autocorrelation(residual: Floats, lags: int) -> Floats:
 
 
 def _runs_probability(residual: Floats) -> float:
+    from scipy.stats import norm
+
     above = residual > np.median(residual)
     plus, minus = float(np.count_nonzero(above)), float(np.count_nonzero(~above))
     total = plus + minus

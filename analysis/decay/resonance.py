@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import least_squares
 
 from vibroimpact.analysis.dataset.results import described
 from vibroimpact.analysis.decay.estimate import Estimate, table_of
@@ -213,6 +212,8 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     EstimationError
         No resonance is in the band.
     """
+    from scipy.optimize import least_squares
+
     curve = curve_of(curve) if isinstance(curve, FrequencyResponse) else curve
     omega, magnitude = curve.angular_frequency, np.abs(curve.response)
     peak, width = _peak(omega, magnitude)

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.energy import Drawn, EnergyBalance, HalfEnergies, unknowns_by_speed
 from vibroimpact.analysis.estimation.estimates import MethodEstimate
@@ -112,6 +111,8 @@ def with_intervals(
     EstimationError
         As the estimator's, or it fails on more than a tenth of the draws.
     """
+    from scipy.stats import t as student
+
     measured = estimator(resampled, resampled.measured, {})
     exact = estimator(resampled, resampled.exact, {})
     drawn = estimator(resampled, resampled.drawn, resampled.varied)

@@ -10,8 +10,6 @@ import math
 
 import numpy as np
 import xarray as xr
-from scipy.stats import chi2
-from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.estimates import Doubt, FittedMotion, ImpactEstimates, MethodEstimate
 from vibroimpact.analysis.estimation.physics import Floats, Known
@@ -74,6 +72,8 @@ def estimate_bounces(
     >>> round(estimate_bounces(ball).values["flight_times"]["restitution"].value, 4)
     0.8
     """
+    from scipy.stats import t as student
+
     channel = channel_of(channel)
     fastest = 2.0 * math.pi * _TURNS / float(channel.time[-1] - channel.time[0])
     cut = segment_channel(channel, fastest, Known(side=side), window)
@@ -126,6 +126,9 @@ def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[M
 
     Generalized least squares of log T[n] = log T[0] + n log r: neighbouring flights share the error of an instant.
     """
+    from scipy.stats import chi2
+    from scipy.stats import t as student
+
     times = np.array([impact.time for impact in impacts])
     errors = np.hypot([impact.time_error for impact in impacts], _INSTANT * interval)
     lengths = np.diff(times)

@@ -9,7 +9,6 @@ from functools import partial
 
 import numpy as np
 import xarray as xr
-from scipy.stats import norm
 
 from vibroimpact.analysis.estimation.draws import (
     Resampled,
@@ -202,6 +201,8 @@ def _with_coordinates(
 
 def _weak_values(record: Prepared, confidence: float) -> Estimates:
     """Return what weak form and flights say."""
+    from scipy.stats import norm
+
     quantile = float(norm.ppf(0.5 + confidence / 2.0))
     found: Estimates = {}
     for name, error in record.fit.standard_errors.items():

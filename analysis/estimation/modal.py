@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight, pairs_of
@@ -155,6 +154,8 @@ def estimate_modes(
         No impacts, flights that a mode does not follow, or energies that contradict themselves by more than noise
         can: within it a nearly elastic stop may show a restitution above 1.
     """
+    from scipy.stats import t as student
+
     contact = contact_shape @ coordinates
     good = np.isfinite(contact)
     cut = segment(time, contact, good, fastest=fastest, side=side, stop_position=stop_position)

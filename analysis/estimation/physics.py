@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, qmc
 
 from vibroimpact.fmus.core import Oscillator
 
@@ -262,6 +261,8 @@ class Coordinates:
 @lru_cache(maxsize=8)
 def _normal_draws(count: int) -> Floats:
     """Return evenly spread normal numbers, shape (draw, count), symmetric about 0."""
+    from scipy.stats import norm, qmc
+
     even = qmc.Sobol(count, scramble=False).random_base2(_DRAWS)[1:]
     half = norm.ppf(np.clip(even, 1e-9, 1.0 - 1e-9))
     found: Floats = np.concatenate([half, -half])

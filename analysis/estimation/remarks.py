@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy.stats import norm
 
 from vibroimpact.analysis.estimation.draws import Resampled
 from vibroimpact.analysis.estimation.energy import sensitivities
@@ -229,6 +228,8 @@ def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
 
 def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
     """Tell whether two intervals have nothing in common, and by more than chance explains."""
+    from scipy.stats import norm
+
     turn = 2.0 * math.pi * round((other.value - one.value) / (2.0 * math.pi)) if name == "phase" else 0.0
     gap = one.value + turn - other.value
     between = one.value - one.low, other.high - other.value

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
-from scipy.signal import find_peaks, oaconvolve
 
 from vibroimpact.analysis.estimation.noise import Mask, noise_level, one_sided_window
 from vibroimpact.analysis.estimation.physics import Floats, Known
@@ -318,6 +317,8 @@ def _hinge(count: int) -> Floats:
 
 def _jumps(values: Floats, good: Mask, even: Mask, weights: Floats) -> Floats:
     """Return the jump of the velocity in each sampling interval, times its length; NaN where it is not known."""
+    from scipy.signal import oaconvolve
+
     count = len(weights) // 2
     jump = np.full(len(values) - 1, np.nan)
     if len(values) >= 2 * count:
@@ -344,6 +345,8 @@ def _side_sign(jump: Floats, side: str | None) -> float:
 
 def _kinks(drop: Floats, least: float, count: int) -> list[int]:
     """Return the sampling intervals with the largest drop of the velocity around them."""
+    from scipy.signal import find_peaks
+
     height = np.where(np.isfinite(drop), drop, -np.inf)
     # within a window of a larger kink the one-sided fits have that kink in them
     edges = np.concatenate([[-np.inf], height, [-np.inf]])

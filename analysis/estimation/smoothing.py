@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from vibroimpact.analysis.estimation.physics import Floats
 from vibroimpact.analysis.estimation.segments import Flight, Signal
@@ -44,6 +43,8 @@ class Smoother:
 
     def row(self, time: Floats, order: int = 0) -> Floats:
         """Return the weights of the samples for the value, or a derivative, at times; shape (time, sample)."""
+        from scipy.interpolate import BSpline
+
         count = len(self.knots) - _DEGREE - 1
         basis = BSpline(self.knots, np.eye(count), _DEGREE, extrapolate=True)
         part = basis(np.asarray(time) - self.flight.start, nu=order)
@@ -62,6 +63,8 @@ class Smoother:
 
 def smoother(signal: Signal, flight: Flight, window: float) -> Smoother:
     """Return the spline of a flight with knots about one window apart."""
+    from scipy.interpolate import BSpline
+
     spans = max(1, round(flight.duration / window))
     inner = np.linspace(0.0, flight.duration, spans + 1)
     knots = np.concatenate([np.zeros(_DEGREE), inner, np.full(_DEGREE, flight.duration)])

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight
 from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters
@@ -375,6 +374,8 @@ class PathProblem:
 
     def solve(self, noise: float) -> Trajectory:
         """Return the least squares from the start on."""
+        from scipy.optimize import least_squares
+
         unit = max(noise, 1e-300)
         found: Any = least_squares(
             lambda x: self.residual(x) / unit,

@@ -20,8 +20,6 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legval
-from scipy.optimize import least_squares
-from scipy.stats import chi2
 
 from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Signal
@@ -218,6 +216,8 @@ def weak_form(
     EstimationError
         No flights, or fewer equations than unknowns, or data that do not determine them.
     """
+    from scipy.optimize import least_squares
+
     stacked = _Stacked(flights)
     if stacked.rows <= len(free):
         raise EstimationError(
@@ -292,6 +292,8 @@ def robust_weak_form(
 
 def _misfit_limits(flights: Sequence[WeightedFlight]) -> Floats:
     """Return the largest mean square of whitened residuals that noise of unit variance gives, for each flight."""
+    from scipy.stats import chi2
+
     ranks = np.array([flight.weights.shape[1] for flight in flights])
     limits: Floats = _NOISE_DOUBT * chi2.isf(_SELDOM, ranks) / ranks
     return limits

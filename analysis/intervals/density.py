@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from vibroimpact.analysis.intervals.trains import Floats
 
@@ -127,6 +126,8 @@ def _edges(low: float, high: float, width: float, resolution: float) -> Floats:
 
 def _distinct(kernel: Floats, effective: float) -> NDArray[np.intp]:
     """Return the places of distinct peaks; `effective`: number of intervals times bandwidth, s."""
+    from scipy.signal import find_peaks
+
     padded = np.concatenate([[0.0], kernel, [0.0]])
     places, found = find_peaks(padded, height=LOWEST_PEAK * kernel.max(), prominence=0.0)
     heights, prominences = found["peak_heights"], found["prominences"]

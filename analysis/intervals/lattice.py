@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
 
 from vibroimpact.analysis.intervals.density import interval_density
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
@@ -187,6 +186,8 @@ def _shares(
 
 def _share(count: int, trials: int, seen: float) -> Share:
     """Return the probability of what is seen only in a part of all cases."""
+    from scipy.stats import beta
+
     value = count / trials
     error = np.sqrt(value * (1.0 - value) / trials) if value < 1.0 else float("nan")
     upper = float(beta.ppf(0.95, count + 1, trials - count)) if count < trials else 1.0

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.safe_toml import parse_toml
@@ -227,6 +226,8 @@ def _limits(oscillator: ImpactOscillator, low: float, high: float, sigma: float)
 
 def _roots(function: Callable[[Any], Any], grid: Floats) -> list[float]:
     """Return the roots of a function between grid points; a change of sign through a pole is none."""
+    from scipy.optimize import brentq
+
     values = function(grid)
     roots = []
     for k in np.flatnonzero(values[:-1] * values[1:] <= 0):

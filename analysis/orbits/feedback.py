@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import expm
 
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit
@@ -52,6 +51,8 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
     OrbitError
         It has several impacts, or modes.
     """
+    from scipy.linalg import expm
+
     body = orbit.body
     if orbit.phases.size != 1 or body.frequencies.size != 1:
         raise OrbitError(
@@ -89,6 +90,8 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
 
 def _pushed(natural: float, decay: float, force: float, w: float, phase: float, length: float) -> Floats:
     """Return displacement and velocity after `length` s from rest, under force cos(w t + phase)."""
+    from scipy.linalg import expm
+
     oscillator = np.array(
         [
             [0.0, 1.0, 0.0, 0.0],

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import (
@@ -330,6 +329,8 @@ class Follower:
         self, now: BranchOrbit, step: float, test: Callable[[BranchOrbit], float]
     ) -> tuple[float, BranchOrbit] | None:
         """Return where along a step a test is 0, and the orbit there."""
+        from scipy.optimize import brentq
+
         lost = []
 
         def at(part: float) -> float:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.following import (
@@ -295,6 +294,8 @@ class LocusFollower:
     def _located(
         self, kind: str, now: LocusPoint, step: float, test: Callable[[LocusPoint], float]
     ) -> LocusPoint | None:
+        from scipy.optimize import brentq
+
         def at(part: float) -> float:
             found = (now, 0) if part == 0.0 else self._step(kind, now, part)
             return float(np.nan) if found is None else test(found[0])

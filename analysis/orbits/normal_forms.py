@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import OrbitError
@@ -120,6 +119,8 @@ def grazing_family(body: ImpactingBody, amplitude: float) -> GrazingFamily:
     OrbitError
         It has several modes or stops, rests on its stop, or its map is void.
     """
+    from scipy.linalg import expm
+
     natural, decay, toward = one_mode(body)
     contact, w = body.contacts[0], body.angular_frequency
     gap = contact.direction * contact.position - toward * float(body.held[0]) / natural**2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import (
@@ -97,6 +96,8 @@ def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -
 
 
 def _trains(impacts: int, periods: int, contacts: int, starts: int) -> list[tuple[Floats, NDArray[np.int32]]]:
+    from scipy.stats import qmc
+
     draw = qmc.Halton(2 * impacts, seed=0).random(starts)
     phases = np.sort(draw[:, :impacts], axis=1) * TURN * periods
     hit = np.floor(draw[:, impacts:] * contacts).astype(np.int32)

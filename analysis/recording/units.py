@@ -9,12 +9,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
-
-import pint
+from typing import TYPE_CHECKING, Any
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.units import written_unit
+
+if TYPE_CHECKING:
+    import pint
 
 # What instruments write, in pint's words; `g` and `G` are gravity here.
 _LABELS = {
@@ -66,6 +67,8 @@ def unit_label(cf: str) -> str:
 
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[float]:
+    import pint
+
     return pint.UnitRegistry()
 
 
@@ -90,6 +93,8 @@ def measured_unit(label: str) -> MeasuredUnit:
     >>> measured_unit("mV").cf, measured_unit("m/s^2").cf, measured_unit("m s-2").cf
     ('0.001 V', 'm s-2', 'm s-2')
     """
+    import pint
+
     text = label.strip().translate(_SUPERSCRIPTS)
     if text in _OFFSET_LABELS:
         return MeasuredUnit(label, "degree_Celsius", "degree_Celsius", 1.0)

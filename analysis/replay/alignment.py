@@ -12,10 +12,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import rfft
-from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize_scalar
-from scipy.signal import correlate
 
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.replay.event import ChannelEvent, find_event
@@ -97,6 +93,8 @@ class Interpolated:
     """
 
     def __init__(self, time: Floats, values: Floats) -> None:
+        from scipy.interpolate import CubicSpline
+
         if len(time) < 4 or len(time) != len(values) or not np.all(np.isfinite(values)):
             raise EstimationError(
                 f"simulated signal: expected at least 4 finite samples, one for each instant, got {len(time)} "
@@ -139,6 +137,8 @@ class _Start:
 
         One Fourier transform instead of a sum for each lag; samples that are not good have no weight.
         """
+        from scipy.signal import correlate
+
         count = round((self.time[-1] - self.time[0]) / self.step) + 1
         grid = self.time[0] + self.step * np.arange(count)
         near = np.clip(np.searchsorted(self.time, grid - 0.5 * self.step), 0, len(self.time) - 1)
@@ -160,6 +160,8 @@ class _Start:
 
     def refine(self, lag: float, polarity: int, reach: float, most_lag: float) -> float:
         """Return the lag of the highest correlation within `reach` of a lag."""
+        from scipy.optimize import minimize_scalar
+
         low, high = max(lag - reach, -most_lag), min(lag + reach, most_lag)
         if low >= high:
             return low
@@ -328,6 +330,8 @@ def _peaks(start: _Start, signs: tuple[int, ...], most_lag: float) -> list[_Peak
 
 def _independent(residual: Floats) -> float:
     """Return how many independent samples a correlated residual is worth: n over the sum of its squared correlation."""
+    from scipy.fft import rfft
+
     count = len(residual)
     deviation = residual - np.mean(residual)
     energy = float(np.sum(deviation**2))

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -118,6 +117,8 @@ def _pairs(points: list[tuple[float, float]], others: list[tuple[float, float]],
 
 def _extremes(time: Floats, values: Floats, inside: Flags, period: float) -> list[int]:
     """Return the rows of maxima above and minima below zero, in order."""
+    from scipy.signal import find_peaks
+
     if not np.any(inside):
         return []
     interval = float(np.median(np.diff(time)))

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft, rfftfreq
-from scipy.signal import get_window
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +59,9 @@ def dominant_frequency(
     >>> round(line.frequency, 2), round(line.resolution, 2), round(line.uncertainty, 3)
     (41.3, 2.5, 0.413)
     """
+    from scipy.fft import next_fast_len, rfft, rfftfreq
+    from scipy.signal import get_window
+
     known = np.isfinite(values)
     if np.count_nonzero(known) < FEWEST_SAMPLES:
         return DominantFrequency(np.nan, np.nan, np.nan)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import get_window
 
 from vibroimpact.analysis.robust import MAD_TO_SIGMA, robust_sigma
 from vibroimpact.analysis.spikes.baseline import running_median
@@ -113,6 +112,8 @@ def _none(values: Floats, reason: str) -> PeriodicPart:
 
 def _strongest_line(values: Floats) -> float | None:
     """Return the period (samples) of the strongest line of the spectrum that has ten cycles in the signal."""
+    from scipy.signal import get_window
+
     length = len(values)
     if length < FEWEST_CYCLES * _FEWEST_SAMPLES:
         return None
@@ -157,6 +158,8 @@ def refined_period(values: Floats, period: float) -> float:
     >>> round(refined_period(np.sin(2 * np.pi * samples / 123.4567), 124.0), 3)
     123.457
     """
+    from scipy.signal import get_window
+
     for _ in range(_REFINEMENTS):
         whole = max(2, round(period))
         count = len(values) // whole

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from vibroimpact.analysis.recording import Channel, Quality
 from vibroimpact.analysis.recording.units import measured_unit
@@ -315,6 +314,8 @@ def _noise(
     method: str,
 ) -> tuple[Tail, float]:
     """Return the tail of the statistic and the noise of the residual."""
+    from scipy.special import ndtri
+
     tail = tail_threshold(statistic[~bad], settings.false_alarms, polarity)
     noise = settings.noise
     if noise is not None and method != "cycle_median":

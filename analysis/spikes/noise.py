@@ -19,7 +19,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from vibroimpact.analysis.robust import robust_sigma
 
@@ -142,6 +141,8 @@ def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Ta
     polarity : int
         1 or -1 to look at peaks of one sign only, 0 for both.
     """
+    from scipy.special import ndtri
+
     values = values[quiet(values)]
     sigma = robust_sigma(values)
     if sigma == 0.0:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import resample
 
 from vibroimpact.analysis.recording.channels import PAUSE
 from vibroimpact.analysis.spikes.detection import crossing
@@ -253,6 +252,8 @@ def _band_limited(found: Identification, pulse: _Pulse) -> tuple[float, float]:
     band-limited function; it is read at sixteen points between samples. Samples of a clipped peak know nothing of what
     is between them.
     """
+    from scipy.signal import resample
+
     top = pulse.top
     first, stop = max(0, top - _SAMPLES_BESIDE), min(len(found.time), top + _SAMPLES_BESIDE + 1)
     pauses = first + 1 + np.flatnonzero(np.diff(found.time[first:stop]) > PAUSE * found.interval)

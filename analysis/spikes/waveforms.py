@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
 
 Floats = NDArray[np.float64]
 
@@ -59,6 +58,8 @@ def _haversine_part(level: Floats) -> Floats:
 
 
 def _bell_part(level: Floats) -> Floats:
+    from scipy.special import erf
+
     part: Floats = erf(np.sqrt(-np.log(level)))
     return part
 

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vibroimpact.fmus.core.modes import beam_modes
 from vibroimpact.orchestrator.hard_cases.case import Curve, Floats, Found, HardCase, largest, relative
@@ -52,6 +51,8 @@ def _from_below() -> Found:
 
 def first_root(function: Callable[[Floats], Floats], end: float) -> float:
     """Return the first root of a function that begins below 0, looked for on an even grid."""
+    from scipy.optimize import brentq
+
     times = np.linspace(0.0, end, SCANNED)
     above = np.flatnonzero(function(times) > 0.0)
     place = int(above[0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, largest, relative
 from vibroimpact.orchestrator.hard_cases.runs import (
@@ -52,6 +51,8 @@ PRODUCTS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 
 def _hunt_crossley() -> Found:
     """equations.md 6.10: p (1 + e) = ln((1 + p) / (1 - p e)) with p = damping times speed, whatever the exponent."""
+    from scipy.optimize import brentq
+
     errors = []
     for product in PRODUCTS:
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.replay.alignment import Interpolated
@@ -150,6 +149,8 @@ def drawn_noise(sample: Floats, count: int, random: np.random.Generator) -> Floa
 
     White noise convolved with the sample: the spectrum is that of the sample, squared and smoothed.
     """
+    from scipy.signal import fftconvolve
+
     white = random.normal(0.0, 1.0 / np.sqrt(len(sample)), count + len(sample) - 1)
     noise: Floats = fftconvolve(white, sample, mode="valid")
     return noise

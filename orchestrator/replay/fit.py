@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from vibroimpact.analysis.replay.alignment import Interpolated
 from vibroimpact.analysis.replay.comparison import Comparison
@@ -284,6 +283,8 @@ class _Fit:
         self, values: Floats, comparisons: Sequence[Sequence[Comparison]], chosen: Flags | None = None
     ) -> Floats:
         """Return the values of least squares from a start, lag and polarity held; only the chosen ones are changed."""
+        from scipy.optimize import least_squares
+
         rows = np.flatnonzero(np.ones(len(values)) if chosen is None else chosen)
         lower, upper, scale = (ends[rows] for ends in (self.lower, self.upper, self.scale))
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from scipy.optimize import brentq
-
 from vibroimpact.orchestrator.scene.models import (
     HertzStop,
     HuntCrossleyStop,
@@ -123,6 +121,8 @@ def damping_ratio_of(restitution: float) -> float:
     >>> round(damping_ratio_of(0.7440794), 6), round(damping_ratio_of(0.04776873), 6)
     (0.1, 2.0)
     """
+    from scipy.optimize import brentq
+
     found: float = brentq(lambda ratio: restitution_of(ratio) - restitution, 0.0, MOST_RATIO, xtol=1e-15)
     return found
 
@@ -160,6 +160,8 @@ def product_of_restitution(restitution: float) -> float:
 
 def _root(off: Callable[[float], float], least: float, most: float) -> float:
     """Return where a function rises through 0; `most`, below which it is negative, where it comes too close to that."""
+    from scipy.optimize import brentq
+
     if off(most) < 0.0:
         return most
     found: float = brentq(off, least, most, xtol=1e-15)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import ks_2samp
+from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.study.observation import Observation
 
@@ -70,12 +70,18 @@ def _told(found: Observation) -> int:
 
 def _off(found: Observation, other: Observation) -> tuple[float, float]:
     own, others = (float(np.diff(one.impacts[:, 0]).mean()) for one in (found, other))
-    distance = float(ks_2samp(found.impacts[:, 1], other.impacts[:, 1]).statistic)
-    return abs(own - others) / others, distance
+    return abs(own - others) / others, _distance(found.impacts[:, 1], other.impacts[:, 1])
 
 
 def _off_samples(found: Observation, other: Observation) -> tuple[float, float]:
     assert found.samples is not None
     assert other.samples is not None
     pairs = zip(found.samples.T, other.samples.T, strict=True)
-    return math.nan, max(float(ks_2samp(own, others).statistic) for own, others in pairs)
+    return math.nan, max(_distance(own, others) for own, others in pairs)
+
+
+def _distance(values: NDArray[np.float64], others: NDArray[np.float64]) -> float:
+    """Return the largest difference of two empirical distribution functions."""
+    from scipy.stats import ks_2samp
+
+    return float(ks_2samp(values, others).statistic)
