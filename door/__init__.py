@@ -54,6 +54,8 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.analysis.spikes import Mechanics as Mechanics
     from vibroimpact.analysis.spikes import SpikeSettings as SpikeSettings
     from vibroimpact.analysis.spikes import spike_report as spike_report
+    from vibroimpact.campaigns import campaign as campaign
+    from vibroimpact.claims import hard_cases as hard_cases
     from vibroimpact.exchange import export_fmu as export_fmu
     from vibroimpact.exchange import export_ssp as export_ssp
     from vibroimpact.exchange import import_ssp as import_ssp
@@ -75,15 +77,13 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.orchestrator.orbits.resonances import resonances as resonances
     from vibroimpact.orchestrator.orbits.seeds import seed_of_run as seed_of_run
     from vibroimpact.orchestrator.scene import Scene as Scene
+    from vibroimpact.replays import replay as replay
     from vibroimpact.service.client import Service as Service
-    from vibroimpact.simulation import accuracy as accuracy
-    from vibroimpact.simulation import campaign as campaign
     from vibroimpact.simulation import cost_of as cost_of
-    from vibroimpact.simulation import effects as effects
-    from vibroimpact.simulation import hard_cases as hard_cases
-    from vibroimpact.simulation import replay as replay
     from vibroimpact.simulation import run as run
-    from vibroimpact.simulation import sensitivity as sensitivity
+    from vibroimpact.sobol import sensitivity as sensitivity
+    from vibroimpact.studies import accuracy as accuracy
+    from vibroimpact.studies import effects as effects
 
     __version__: str
 
@@ -108,6 +108,8 @@ _NAMES = {
     ),
     "analysis.spectral_density": ("spectral_density",),
     "analysis.spikes": ("Mechanics", "SpikeSettings", "spike_report"),
+    "campaigns": ("campaign",),
+    "claims": ("hard_cases",),
     "exchange": ("export_fmu", "export_ssp", "import_ssp"),
     "fmus.errors": ("VibroimpactError",),
     "hardware.programs.record": ("record",),
@@ -122,17 +124,11 @@ _NAMES = {
     "orchestrator.orbits.resonances": ("resonances",),
     "orchestrator.orbits.seeds": ("seed_of_run",),
     "orchestrator.scene": ("Scene",),
+    "replays": ("replay",),
     "service.client": ("Service",),
-    "simulation": (
-        "accuracy",
-        "campaign",
-        "cost_of",
-        "effects",
-        "hard_cases",
-        "replay",
-        "run",
-        "sensitivity",
-    ),
+    "simulation": ("cost_of", "run"),
+    "sobol": ("sensitivity",),
+    "studies": ("accuracy", "effects"),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}

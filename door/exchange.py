@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene
+from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene, scene_with_modes
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import export_system, import_system, load_system
-from vibroimpact.orchestrator.study.preparation import with_found_modes
 
 
 def export_fmu(
@@ -52,7 +51,7 @@ def export_fmu(
     >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
     """
     return export_scene(
-        with_found_modes(given_scene(scene)),
+        scene_with_modes(scene),
         given_path(path),
         fmi=fmi,
         full=full,

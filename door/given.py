@@ -40,6 +40,29 @@ def given_scene(given: SceneLike) -> Scene:
     )
 
 
+def prepared_scene(given: SceneLike) -> Scene:
+    """Return the scene that a caller means, ready to run: see `study.preparation.prepared_scene`.
+
+    Studies take longer to load than most scenes to run, and a scene without a tolerance needs none.
+    """
+    scene = given_scene(given)
+    if scene.execution.tolerance is None:
+        return scene
+    from vibroimpact.orchestrator.study.preparation import prepared_scene as prepared
+
+    return prepared(scene)
+
+
+def scene_with_modes(given: SceneLike) -> Scene:
+    """Return the scene that a caller means, its number of modes found: see `study.preparation.with_found_modes`."""
+    scene = given_scene(given)
+    if scene.execution.tolerance is None:
+        return scene
+    from vibroimpact.orchestrator.study.preparation import with_found_modes
+
+    return with_found_modes(scene)
+
+
 def given_path(given: object) -> Path:
     """Return the file or folder that a caller names.
 

@@ -1,0 +1,75 @@
+"""Sweeps of a scene on many workers: a dataset comes back, the campaign stays in its folder."""
+
+from __future__ import annotations
+
+import os
+from contextlib import nullcontext
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.given import PathLike, SceneLike, given_path, prepared_scene
+from vibroimpact.orchestrator.campaign import run_campaign
+from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
+from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
+from vibroimpact.orchestrator.ssp import refuse_system_elsewhere
+
+
+def campaign(
+    scene: SceneLike,
+    folder: PathLike,
+    *,
+    workers: int | None = None,
+    scheduler: str | Client | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Compute all points of a scene's sweep with many workers; the same call resumes after anything.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+    folder : path
+        One campaign, one folder; made when absent. The dataset is `dataset.nc` in it.
+    workers : int, optional
+        Worker processes on this machine; one for each processor by default.
+    scheduler : str or dask.distributed.Client, optional
+        Workers to use instead: the address of a Dask scheduler, or a client of it.
+    progress : bool
+        Show how far it is.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `open_dataset(folder)` gives it.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        The folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
+    CampaignError
+        The campaign could not finish; the same call resumes it.
+    CampaignInterrupted
+        On Ctrl-C, a KeyboardInterrupt; the same call resumes.
+
+    Examples
+    --------
+    >>> found = campaign("examples/bifurcation.toml", "bifurcation", workers=2)        # doctest: +SKIP
+    >>> found.displacement_range.sel(direction="up")                                   # doctest: +SKIP
+    """
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise UsageError(f"workers: expected a whole number of 1 or more, got {workers!r}.")
+    refuse_two_kinds_of_workers(workers, scheduler)
+    if isinstance(scene, str | os.PathLike):
+        refuse_system_elsewhere(scene, scheduler)
+    with shown_progress() if progress else nullcontext(Progress()) as shown:
+        report = run_campaign(
+            prepared_scene(scene),
+            given_path(folder),
+            workers=workers,
+            scheduler=scheduler,
+            progress=shown,
+        )
+    return open_dataset(report.dataset)

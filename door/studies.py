@@ -1,0 +1,99 @@
+"""Measured studies of a scene: what accuracy costs, and what each effect costs and changes."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.given import PathLike, SceneLike, given_result, scene_with_modes
+from vibroimpact.orchestrator.study import BUDGET, dataset_of, refuse_unreached, study_accuracy
+from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
+from vibroimpact.orchestrator.study.refusals import refuse_misuse
+
+
+def accuracy(
+    scene: SceneLike,
+    path: PathLike | None = None,
+    *,
+    tolerance: float | None = None,
+    of: str = "all",
+    budget: float = BUDGET,
+) -> xr.Dataset:
+    """Simulate a scene in all ways that it can be, and measure what the accuracy of each costs in time.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        Its sweep is left out.
+    path : path, optional
+        The dataset to write as well (.nc).
+    tolerance : float, optional
+        Relative error for which the cheapest way is looked for.
+    of : str
+        What errors are of: `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`, or `all`.
+    budget : float
+        Wall time to spend, about, s.
+
+    Returns
+    -------
+    xarray.Dataset
+        `error` and `cost` (s) of each `way`, what is wrong with it (`failure`); `attrs["verdict"]` says what to choose.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        There is nothing to vary, no such quantity, no such budget, no place for the file, or no way reaches the
+        tolerance. Only the last takes the time of a study, unless the reference is known to less.
+
+    Examples
+    --------
+    >>> accuracy("examples/single_run.toml", tolerance=1e-6).attrs["chosen"]    # doctest: +SKIP
+    'fused'
+    """
+    refuse_misuse(tolerance, of, budget)
+    target = given_result(path)
+    study = study_accuracy(scene_with_modes(scene), tolerance=tolerance, quantity=of, budget=budget)
+    dataset = dataset_of(study)
+    if target is not None:
+        write_results(dataset, target, kind="accuracy")
+    refuse_unreached(study)
+    return dataset.assign_attrs(results_kind="accuracy")
+
+
+def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
+    """Run a scene with and without each effect that it asks for, and measure what each costs and changes.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        Its sweep is left out.
+    path : path, optional
+        The dataset to write as well (.nc).
+
+    Returns
+    -------
+    xarray.Dataset
+        `share` of the time of a run, `change` without it (relative) and `changes` (in words) of each `effect`, the
+        dearest first; `attrs["not_simulated"]` lists what the scene does not call for.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        The dataset cannot be written there.
+
+    Examples
+    --------
+    >>> effects("examples/chatter.toml").attrs["not_simulated"].split(", ")[0]    # doctest: +SKIP
+    'recorded drive'
+    """
+    target = given_result(path)
+    chosen = scene_with_modes(scene)
+    alone = chosen.with_sweep({}) if chosen.sweep else chosen
+    dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
+    if target is not None:
+        write_results(dataset, target, kind="effects")
+    return dataset.assign_attrs(results_kind="effects")
