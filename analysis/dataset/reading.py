@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from xarray.backends import BackendArray
+from xarray.backends import BackendArray, StoreBackendEntrypoint
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
@@ -218,7 +218,14 @@ def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
         # xarray would read all texts at once: those that are no labels can wait.
         texts = {name: stored[name] for name in _texts(stored)}
         # Flags are not floats, and what is missing is NaN already.
-        dataset = xr.open_dataset(store, decode_times=False, mask_and_scale=False, drop_variables=texts)
+        # Without an engine xarray loads all that are installed, and asks each of them.
+        dataset = xr.open_dataset(
+            store,
+            engine=StoreBackendEntrypoint,
+            decode_times=False,
+            mask_and_scale=False,
+            drop_variables=texts,
+        )
     except BaseException:
         store.close()
         raise

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
 from vibroimpact.analysis.dataset.schema import CONVENTIONS
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
@@ -21,16 +22,21 @@ Row = tuple[str | tuple[str, ...], Any, str, str]
 Rows = Mapping[str, Row]
 
 
-def described(rows: Rows) -> dict[str, Any]:
-    """Return variables as xarray takes them, each with its `units` and `long_name`.
+def described(rows: Rows) -> dict[str, xr.Variable]:
+    """Return variables of xarray, each with its `units` and `long_name`.
 
-    >>> described({"rate": ((), 2.0, "Hz", "events per second")})
-    {'rate': ((), 2.0, {'units': 'Hz', 'long_name': 'events per second'})}
+    >>> described({"rate": ((), 2.0, "Hz", "events per second")})["rate"].attrs
+    {'units': 'Hz', 'long_name': 'events per second'}
     """
-    return {
-        name: (dims, values, {"units": unit, "long_name": words})
-        for name, (dims, values, unit, words) in rows.items()
-    }
+    return {name: _variable(name, row) for name, row in rows.items()}
+
+
+def _variable(name: str, row: Row) -> xr.Variable:
+    dims, values, unit, words = row
+    attributes = {"units": unit, "long_name": words}
+    if dims in (name, (name,)):
+        return new_axis(name, np.asarray(values), attributes)
+    return new_variable(dims, np.asarray(values), attributes)
 
 
 def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
-from vibroimpact.analysis.dataset.assembling import assembled, wrapped
+from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable, wrapped
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.columns import (
     OF_ALL_PERIODS,
@@ -412,16 +412,17 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
     linked = " ".join(("run_index", "direction", *swept_names(dataset), *constant_names(dataset)))
-    loaded = dataset.compute()  # what is read of another file wants the lock, too
+    # what is read of another file wants the lock, too
+    variables = {name: loaded_variable(variable) for name, variable in dataset.variables.items()}
     with netcdf_lock():
         file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
         # Every value is written below: filling first would write everything twice.
         file.set_fill_off()
-        file.setncatts(dict(loaded.attrs))
-        for name, size in loaded.sizes.items():
+        file.setncatts(dict(dataset.attrs))
+        for name, size in dataset.sizes.items():
             file.createDimension(str(name), size)
-        for name, variable in loaded.variables.items():
-            is_data = variable.dims[:1] == ("run",) and name not in loaded.coords
+        for name, variable in variables.items():
+            is_data = variable.dims[:1] == ("run",) and name not in dataset.coords
             labels = " connection" if "interface" in variable.dims else ""
             labels += " compared" if "comparison" in variable.dims else ""
             _store(file, str(name), variable, compression, linked + labels if is_data else None)
