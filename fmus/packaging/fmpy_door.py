@@ -6,21 +6,45 @@ exchange, which this package does not, is FMPy's too.
 
 from __future__ import annotations
 
+import ctypes.util
 import re
+import sys
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
-from fmpy import simulate_fmu
-from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
-from fmpy.validation import validate_fmu
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.safe_xml import root_of
+
+
+@contextmanager
+def _libraries_of_this_process() -> Iterator[None]:
+    """Let FMPy find the C library in this process: on Linux it would start `ldconfig`, in every worker again."""
+    find_library = ctypes.util.find_library
+    if sys.platform == "linux":
+        # `CDLL(None)` has the symbols of the process
+        ctypes.util.find_library = lambda name: None
+    try:
+        yield
+    finally:
+        ctypes.util.find_library = find_library
+
+
+with _libraries_of_this_process():
+    import fmpy
+    from fmpy import simulate_fmu
+    from fmpy.model_description import (
+        ModelDescription,
+        ModelVariable,
+        ValidationError,
+        read_model_description,
+    )
+    from fmpy.validation import validate_fmu
 
 __all__ = ["ModelDescription", "ModelVariable", "integrated", "read_description", "schema_folder", "validate"]
 

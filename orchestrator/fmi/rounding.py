@@ -7,7 +7,6 @@ than a call of the C library.
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
 import sys
 
 #: ONE + TINY == ONE - TINY where numbers are rounded to nearest, and nowhere else.
@@ -23,7 +22,8 @@ def is_usual() -> bool:
 
 def set_usual() -> None:
     """Go back to the default floating-point environment; elsewhere than on Linux only to rounding to nearest."""
-    library = ctypes.CDLL(ctypes.util.find_library("m") if sys.platform != "win32" else "ucrtbase")
+    # Python itself is linked with the mathematical library: `find_library` would start processes to find it.
+    library = ctypes.CDLL(None if sys.platform != "win32" else "ucrtbase")
     if sys.platform == "linux":
         library.fesetenv(ctypes.c_void_p(-1))  # FE_DFL_ENV of glibc and musl
     else:
