@@ -83,7 +83,8 @@ def _folders() -> dict[str, str]:
 @cache
 def _name_and_folder(path: Path, changed: int) -> tuple[str, str]:
     # every request for an FMU asks for all names, and reading the tables of variables takes longer than the rest
-    head = tomllib.loads(path.read_text(encoding="utf-8"))["component"]
+    table = path.read_text(encoding="utf-8").partition("[component]")[2].partition("\n[")[0]
+    head = tomllib.loads(table)
     return head["name"], head["folder"]
 
 

@@ -7,8 +7,10 @@ module imports nothing above it, and another package can add commands of its own
 from __future__ import annotations
 
 import _thread
+import copy
 import errno
 import functools
+import inspect
 import signal
 import sys
 import threading
@@ -23,6 +25,7 @@ from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
+from typer.models import CommandInfo
 
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.file_names import refuse_no_text
@@ -129,6 +132,43 @@ def load_commands() -> None:
         entry.load()(app)
 
 
+def _with_called(words: Sequence[str]) -> typer.Typer:
+    """Return the app with the command, or group of commands, that is called.
+
+    Typer builds a command in 2 ms, and there are fifty. Where none is called their descriptions are enough; where none
+    has the name that is called, all of them are there to suggest one.
+    """
+    called = next((word for word in words if not word.startswith("-")), None)
+    if called is None:
+        return _described(app)
+    chosen = copy.copy(app)
+    chosen.registered_commands = [one for one in app.registered_commands if _name_of(one) == called]
+    chosen.registered_groups = [one for one in app.registered_groups if one.name == called]
+    return chosen if chosen.registered_commands or chosen.registered_groups else app
+
+
+def _name_of(command: CommandInfo) -> str:
+    return command.name or typer.main.get_command_name(getattr(command.callback, "__name__", ""))
+
+
+def _described(app: typer.Typer) -> typer.Typer:
+    """Return an app whose commands have names and descriptions alone."""
+    shown = copy.copy(app)
+    shown.registered_commands = [copy.copy(one) for one in app.registered_commands]
+    for command in shown.registered_commands:
+        command.name = _name_of(command)
+        command.help = command.help or inspect.getdoc(command.callback)
+        command.callback = _no_command
+    shown.registered_groups = [copy.copy(one) for one in app.registered_groups]
+    for group in shown.registered_groups:
+        group.typer_instance = group.typer_instance and _described(group.typer_instance)
+    return shown
+
+
+def _no_command() -> None:
+    """Stand for a command that is not called."""
+
+
 @contextmanager
 def _no_interrupt_is_lost() -> Iterator[None]:
     """Let an interrupt that would be lost come a moment later.
@@ -185,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with _no_interrupt_is_lost(), command_line():
             load_commands()
             # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
-            typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
+            typer.main.get_command(_with_called(given)).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:
         sys.exit(end.code or (0 if all_was_written() else 1))
     except KeyboardInterrupt:
