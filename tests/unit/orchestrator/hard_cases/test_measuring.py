@@ -12,10 +12,9 @@ import pytest
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import ComponentError, UsageError
-from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, dataset_of
+from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, dataset_of, measured_cases
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, relative
 from vibroimpact.orchestrator.hard_cases.finding import first_root
-
 
 
 def test_names_are_those_of_the_page_and_differ() -> None:
