@@ -50,6 +50,22 @@ def test_ever_stiffer_stops_tend_to_restitution_in_proportion_to_the_contact_tim
         assert coarse / fine == pytest.approx(1000.0**power, rel=0.1)
 
 
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 2.5])
+@pytest.mark.parametrize("p", [0.01, 0.1, 0.5, 1.0, 3.0])
+def test_hunt_crossley_rebounds_as_its_implicit_formula_whatever_the_exponent(
+    exponent: float, p: float
+) -> None:
+    # p (1 + e) = ln((1 + p) / (1 - p e)): equations.md 6.10
+    def residual(e: float) -> float:
+        return p * (1.0 + e) - math.log((1.0 + p) / (1.0 - p * e))
+
+    e = brentq(residual, 1e-9, min(1.0, (1.0 - 1e-12) / p), xtol=1e-15)
+    stop = Stop([1.0], 0.1, law="hunt_crossley", stiffness=1e4, damping=p / 0.8, exponent=exponent)
+    with Structure(Modes([0.0]), [stop], 0.0, 0.8, tolerance=1e-11) as body:
+        body.advance(5.0)
+        assert body.impacts[0, 6] == pytest.approx(e, rel=1e-9)
+
+
 @pytest.mark.parametrize("position", [0.0, 0.1, 1.0])
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
 def test_a_power_law_rebounds_to_its_tolerance_or_the_rounding_of_its_depth(

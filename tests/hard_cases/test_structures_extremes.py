@@ -90,6 +90,23 @@ def test_one_step_of_a_million_periods_and_ten_million_periods_of_steps_end_on_t
             assert len(body.impacts) == 0
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 40.0, 1e9])
+@pytest.mark.parametrize("law", ["restitution", "kelvin_voigt"])
+def test_displacements_in_nanometres_or_volts_are_the_same_motion(unit: float, law: str) -> None:
+    natural, shape = np.array([1.0, 2.7, 6.1]), np.array([1.0, -0.7, 0.5])
+    stop = Stop(shape, 0.1 * unit, law=law, restitution=0.7, stiffness=100.0, damping=1.0)
+    modes = Modes(natural, 0.02, np.array([1.0, 0.2, 0.1]) * unit, 1.3)
+    with Structure(modes, [stop], 0.0, np.array([1.0, 0.3, 0.2]) * unit) as body:
+        assert body.advance(8.0) == DONE
+        found = body.displacement / unit, len(body.impacts)
+    modes = Modes(natural, 0.02, [1.0, 0.2, 0.1], 1.3)
+    stop = Stop(shape, 0.1, law=law, restitution=0.7, stiffness=100.0, damping=1.0)
+    with Structure(modes, [stop], 0.0, [1.0, 0.3, 0.2]) as body:
+        body.advance(8.0)
+        assert found[1] == len(body.impacts)
+        assert np.abs(found[0] - body.displacement).max() <= 1e-11
+
+
 @pytest.mark.parametrize("mass", [1e-9, 1e9])
 def test_light_and_heavy_chains_are_the_unit_chain_on_another_clock(mass: float) -> None:
     def impacts(m: float) -> np.ndarray:

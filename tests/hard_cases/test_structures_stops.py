@@ -171,6 +171,14 @@ def test_a_start_on_the_stop_at_rest_holds_where_it_is_pressed_and_leaves_where_
         assert np.abs(body.displacement - static * (1.0 - np.cos(0.1 * CHAIN.natural))).max() <= 1e-15
 
 
+def test_a_start_moving_into_the_stop_is_an_impact_at_time_0() -> None:
+    p = at([0.0, 0.0, 2.0])
+    with Structure(Modes(CHAIN.natural), [Stop(MASS[2], 0.0, restitution=0.25)], 0.0, p) as body:
+        body.advance(1e-6)
+        assert body.impacts[0, [1, 3]] == pytest.approx([0.0, 2.0], abs=1e-14)
+        assert (MASS @ body.velocity)[2] == pytest.approx(-0.5, abs=1e-5)
+
+
 def test_a_start_beyond_a_rigid_stop_is_refused_and_a_stop_below_rest_is_met_at_once() -> None:
     with pytest.raises(UsageError):
         Structure(Modes([1.0]), [Stop([1.0], -0.1)], 0.0, 0.0)
@@ -204,6 +212,29 @@ def test_a_load_that_turns_round_between_steps_lifts_a_held_mass_off_at_that_ins
 
 
 # ---- beams with stops at several points ----
+
+
+def test_a_beam_with_four_stops_and_uneven_damping_loses_what_its_balance_says() -> None:
+    cantilever = beam(8, damping_ratio=[0.0, 0.5, 0.0, 0.3, 0.0, 0.01, 2.0, 0.0])
+    zeta = np.diag(cantilever.damping) / (2.0 * cantilever.natural)
+    stops = [
+        Stop(cantilever.shape(1.0), 0.02, restitution=0.7),
+        Stop(cantilever.shape(0.5), -0.01, side="lower", restitution=0.9),
+        Stop(cantilever.shape(0.75), 0.02, law="kelvin_voigt", stiffness=1e3, damping=1.0),
+        Stop(cantilever.shape(0.3), -0.005, side="lower", law="hertz", stiffness=1e5),
+    ]
+    force = cantilever.shape(1.0)
+    with Structure(Modes(cantilever.natural, zeta, force, 3.0), stops, 0.0, 0.0, energies=True) as body:
+        turned = 0.0
+        for _ in range(200):
+            assert body.advance(0.05, most_impacts=20000) == DONE
+            turned = max(turned, abs(body.forcing_work) + body.damping_loss + abs(body.contact_loss))
+            left = body.energy - body.forcing_work + body.damping_loss + body.contact_loss
+            assert abs(left) <= 1e-9 * turned
+            size = np.abs(body.displacement).sum() * 2.0
+            for stop, sign in zip(stops[:2], (1.0, -1.0), strict=True):
+                assert sign * (np.asarray(stop.shape) @ body.displacement - stop.position) <= 1e-12 * size
+        assert len(body.impacts) > 100
 
 
 def test_two_masses_let_go_at_one_instant_write_one_stick_each() -> None:
