@@ -33,11 +33,11 @@ help: ## show this
 demo: $(VENV)/demo.stamp $(VENV)/fmus.stamp ## run the demonstration campaign; leaves a dataset and a figure
 	$(BIN)/vibroimpact demo
 
-fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the quick tests of every room, in some minutes; says what it left out
+fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the quick tests of every room, in about a minute; says what it left out
 	$(BIN)/python -m pytest -q --fast $(PARALLEL)
 
-test: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run all tests but benchmarks and long series; an error where they have become dearer
-	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark and not long" $(PARALLEL) --budget --doctest-modules tests .editable/vibroimpact
+test: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run all tests but benchmarks and long series; ends in an error where they became dearer
+	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark and not long" $(PARALLEL) --budget $(COSTS) --doctest-modules tests .editable/vibroimpact
 
 soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run long series, then thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
 	$(BIN)/python -m pytest --ignore=tests/benchmarks -m long $(PARALLEL)

@@ -13,6 +13,7 @@ from typing import Any
 import hypothesis
 import pytest
 from _pytest.doctest import DoctestModule
+from harness.kept_costs import is_dear
 from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
@@ -29,8 +30,8 @@ SEED = 4
 """Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""
 
 COUNTS = pytest.StashKey[dict[str, list[int]]]()
-SLOW = pytest.StashKey[int]()
-"""Number of tests marked slow or long that `--fast` leaves out."""
+LEFT_OUT = pytest.StashKey[int]()
+"""Number of tests that `--fast` leaves out of the folders that it looks into."""
 
 TESTS = Path(__file__).parent
 FAST_FOLDERS = ("architecture", "unit")
@@ -38,7 +39,7 @@ FAST_FOLDERS = ("architecture", "unit")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are marked neither slow nor long"
+    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are neither dear nor long"
     parser.addoption("--fast", action="store_true", help=text)
     where = "a board for the tests of rigs: Dev1 of this machine, or grpc://HOST:PORT/Dev1"
     parser.addoption("--real-rig", metavar="BOARD", help=where)
@@ -60,10 +61,11 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> Any:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("fast"):
         return
-    slow = [item for item in items if item.get_closest_marker("slow") or item.get_closest_marker("long")]
-    config.stash[SLOW] = len(slow)
-    config.hook.pytest_deselected(items=slow)
-    items[:] = [item for item in items if item not in slow]
+    left_out = [item for item in items if is_dear(item.nodeid) or item.get_closest_marker("long")]
+    config.stash[LEFT_OUT] = len(left_out)
+    config.hook.pytest_deselected(items=left_out)
+    those = set(left_out)
+    items[:] = [item for item in items if item not in those]
 
 
 def _seed(config: pytest.Config) -> int | str:
@@ -147,7 +149,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         left_out = [f"tests/{folder}" for folder in folders if folder not in FAST_FOLDERS]
         terminalreporter.section("left out")
         terminalreporter.line(
-            f"{config.stash.get(SLOW, 0)} tests that are marked slow, and {', '.join(left_out)}"
+            f"{config.stash.get(LEFT_OUT, 0)} tests that are dear or long, and {', '.join(left_out)}"
         )
 
 

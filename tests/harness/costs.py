@@ -6,7 +6,6 @@ Python and C, which each worker runs now and then.
 
 from __future__ import annotations
 
-import json
 import statistics
 import time
 import tomllib
@@ -17,21 +16,14 @@ from typing import Any
 
 import pytest
 
-from harness import warm
+from harness import kept_costs, warm
 
 KEPT = Path(__file__).with_name("budget.toml")
-SECONDS = Path(__file__).with_name("module_seconds.json")
-"""Wall time of each test module, s, of a run with `--keep-seconds`: what `--side-by-side` orders modules by."""
 DEAREST = 20
 MAY_GROW = 0.1
 """Share of the kept figure by which processor time may grow."""
 EVERY = 20.0
 """Wall time between two yardsticks of a worker, s."""
-
-
-def seconds_of_modules() -> dict[str, float]:
-    """Return the wall time of each test module, s, as it is kept."""
-    return dict(json.loads(SECONDS.read_text())) if SECONDS.exists() else {}
 
 
 def processor_time() -> float:
@@ -94,13 +86,12 @@ TOTAL = pytest.StashKey[tuple[float, float]]()
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "end in an error where the processor time of all tests is above the kept figure; list the dearest"
     parser.addoption("--budget", action="store_true", help=text)
-    parser.addoption(
-        "--keep-seconds", action="store_true", help=f"write {SECONDS.name}, the order of modules"
-    )
+    text = f"write {kept_costs.FILE.name}: the order of modules, and what --fast leaves out"
+    parser.addoption("--keep-costs", action="store_true", help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    if config.getoption("budget") or config.getoption("keep_seconds"):
+    if config.getoption("budget") or config.getoption("keep_costs"):
         config.stash[COSTS] = Costs()
         config.pluginmanager.register(config.stash[COSTS])
 
@@ -115,9 +106,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     costs, seconds = config.stash[COSTS], processor_time()
     costs.yardsticks.append(yardstick())
     config.stash[TOTAL] = seconds, seconds / statistics.mean(costs.yardsticks)
-    if config.getoption("keep_seconds"):
-        kept = {module: round(took, 1) for module, took in sorted(costs.modules.items()) if took >= 0.1}
-        SECONDS.write_text(json.dumps(kept, indent=0) + "\n", encoding="ascii")
+    if config.getoption("keep_costs"):
+        kept_costs.keep(costs.modules, costs.tests)
     if config.getoption("budget") and session.exitstatus == pytest.ExitCode.OK and _excess(config) > MAY_GROW:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import gc
 import os
+import random
 import sys
+from collections.abc import Iterable
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from harness import costs, warm
+from harness import kept_costs, warm
 from harness._shares import Shares
 from harness._worker import run_share
 from vibroimpact.fmus.python_child import ending
@@ -44,6 +46,8 @@ def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "run the tests in so many forked copies of this process, where it can be forked"
     parser.addoption("--side-by-side", type=int, default=0, metavar="N", help=text)
+    text = "beside --side-by-side: begin the modules in an order that is drawn, by this seed"
+    parser.addoption("--drawn-order", type=int, metavar="SEED", help=text)
     text = "beside --side-by-side: start every program anew, and none as a copy of a warm process"
     parser.addoption("--cold", action="store_true", help=text)
 
@@ -76,6 +80,14 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     warm.end_server()
 
 
+def _seconds(config: pytest.Config, modules: Iterable[str]) -> dict[str, float]:
+    """Return how long each module takes, by which the shares are made; with `--drawn-order` numbers by chance."""
+    if config.option.drawn_order is None:
+        return kept_costs.seconds_of_modules()
+    chance = random.Random(config.option.drawn_order)
+    return {module: chance.random() for module in sorted(set(modules))}
+
+
 class _Workers:
     """The forked processes of a session, and what each of them is doing."""
 
@@ -83,7 +95,7 @@ class _Workers:
         count = min(session.config.option.side_by_side, len(session.items))
         modules = [item.nodeid.partition("::")[0] for item in session.items]
         self._session = session
-        self._shares = Shares(modules, costs.seconds_of_modules(), count)
+        self._shares = Shares(modules, _seconds(session.config, modules), count)
         self._links: list[Connection | None] = [None] * count
         self._pids = [0] * count
         self._running: list[int | None] = [None] * count

@@ -1,0 +1,37 @@
+"""What tests cost in a run with `--keep-costs`: the order of modules, and what `--fast` leaves out, follow from it."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+FILE = Path(__file__).with_name("costs_of_tests.json")
+DEAR = 0.08
+"""Processor time of a test, its fixtures and its programs, s, above which `--fast` leaves it out."""
+SHORT = 0.1
+"""Wall time of a module, s, below which its place in the order does not matter."""
+
+
+@functools.cache
+def _kept() -> dict[str, Any]:
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))) if FILE.exists() else {}
+
+
+def seconds_of_modules() -> dict[str, float]:
+    """Return the wall time of each test module, s."""
+    return dict(_kept().get("modules", {}))
+
+
+def is_dear(name: str) -> bool:
+    """Return whether a test, by its name for pytest, took more than `DEAR`; one that is new has not."""
+    return name in _kept().get("dear", {})
+
+
+def keep(modules: Mapping[str, float], tests: Mapping[str, float]) -> None:
+    """Write the wall times of modules, s, and the processor times of tests, s."""
+    long = {name: round(took, 1) for name, took in sorted(modules.items()) if took >= SHORT}
+    dear = {name: round(took, 2) for name, took in sorted(tests.items()) if took > DEAR}
+    FILE.write_text(f"{json.dumps({'modules': long, 'dear': dear}, indent=0)}\n", encoding="ascii")
