@@ -13,7 +13,7 @@ from typing import Any
 import hypothesis
 import pytest
 from _pytest.doctest import DoctestModule
-from harness.kept_costs import is_dear
+from harness.kept_costs import dear_tests
 from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
@@ -61,7 +61,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> Any:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("fast"):
         return
-    left_out = [item for item in items if is_dear(item.nodeid) or item.get_closest_marker("long")]
+    dear = dear_tests()
+    left_out = [item for item in items if item.nodeid in dear or item.get_closest_marker("long")]
     config.stash[LEFT_OUT] = len(left_out)
     config.hook.pytest_deselected(items=left_out)
     those = set(left_out)
@@ -149,7 +150,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         left_out = [f"tests/{folder}" for folder in folders if folder not in FAST_FOLDERS]
         terminalreporter.section("left out")
         terminalreporter.line(
-            f"{config.stash.get(LEFT_OUT, 0)} tests that are dear or long, and {', '.join(left_out)}"
+            f"{config.stash.get(LEFT_OUT, 0)} dear or long tests, and {', '.join(left_out)}"
         )
 
 

@@ -1,4 +1,4 @@
-import ast
+import re
 import runpy
 import subprocess
 import sys
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import import_drawing
 import pytest
+from harness.kept_costs import dear_tests
 from support.places import ROOT
 
 PACKAGES = import_drawing.LAYERS
@@ -77,7 +78,6 @@ def test_what_opens_or_takes_datasets_lets_them_know_their_runs(imported_first: 
     assert result.stdout == "True\n"
 
 
-@pytest.mark.slow
 def test_every_benchmark_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing else of the tests runs them: a name that has moved would be found by the next person who measures."""
     folder = ROOT / "tests" / "benchmarks"
@@ -96,22 +96,16 @@ def test_every_room_has_a_folder_of_tests_of_which_make_fast_runs_some() -> None
         for package in PACKAGES
         for path in ROOT.glob(f"{package}/*/__init__.py")
     }
-    quick = {path.parent.relative_to(unit) for path in unit.rglob("test_*.py") if not all(marked_slow(path))}
+    quick = {path.parent.relative_to(unit) for path in unit.rglob("test_*.py") if has_quick_tests(path)}
     assert sorted(map(str, rooms - quick)) == []
     assert [
         str(path) for path in unit.rglob("test_*.py") if not (ROOT / path.parent.relative_to(unit)).is_dir()
     ] == []
 
 
-def marked_slow(path: Path) -> list[bool]:
-    """Return of each test of a module whether it, or the module, is marked slow."""
-    text = path.read_text(encoding="utf-8")
-    if "pytest.mark.slow" not in text:
-        return [False] * text.count("\ndef test")
-    tests = [
-        node
-        for node in ast.parse(text).body
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("test")
-    ]
-    whole = "pytestmark = pytest.mark.slow" in text
-    return [whole or "pytest.mark.slow" in map(ast.unparse, test.decorator_list) for test in tests]
+def has_quick_tests(path: Path) -> bool:
+    """Return whether `make fast` runs a test of a module: a function none of whose cases is kept as dear."""
+    name = path.relative_to(ROOT).as_posix()
+    functions = re.findall(r"^def (test\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+    dear = {one.partition("[")[0] for one in dear_tests()}
+    return any(f"{name}::{function}" not in dear for function in functions)

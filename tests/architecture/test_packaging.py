@@ -58,7 +58,6 @@ def test_the_sdist_has_the_sources_of_all_packages_and_nothing_built(sdist: Path
     assert [name for name in names if name.startswith(left_out)] == []
 
 
-@pytest.mark.slow
 def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
@@ -89,7 +88,6 @@ def test_a_library_compiled_twice_in_different_places_has_the_same_bytes(name: s
         assert archive.read(library) == compile_component(component, elsewhere)
 
 
-@pytest.mark.slow
 def test_the_wheel_works_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> None:
     environment = tmp_path / "venv"
     venv.create(environment)

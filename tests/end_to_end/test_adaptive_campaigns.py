@@ -19,8 +19,6 @@ from vibroimpact.analysis.landmarks import ImpactOscillator, folds, period_doubl
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import load_scene
 
-pytestmark = pytest.mark.slow
-
 FIGURE = ROOT / "examples" / "thesis" / "figure_3_3.toml"
 KEY = "forcing.angular_frequency"
 AXIS = {"start": 0.6, "stop": 1.6, "path": "up-down"}

@@ -12,8 +12,6 @@ from vibroimpact.analysis.dataset import open_measured
 from vibroimpact.orchestrator.hard_cases import CASES
 from vibroimpact.orchestrator.hard_cases.case import Found
 
-pytestmark = pytest.mark.slow
-
 
 def test_the_cases_that_are_asked_for_leave_a_table_a_dataset_and_a_figure(tmp_path: Path) -> None:
     output, figure = tmp_path / "cases.nc", tmp_path / "cases.png"

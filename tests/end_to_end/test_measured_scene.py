@@ -108,7 +108,6 @@ def test_restitution_damping_and_frequency_come_back_from_the_sensor(measured: P
             assert float(row.interval_low) - width < true < float(row.interval_high) + width
 
 
-@pytest.mark.slow
 def test_a_replay_that_is_driven_in_volts_finds_damping_and_exciter(measured: Path, tmp_path: Path) -> None:
     (tmp_path / "replay.toml").write_text(REPLAY)
     output = tmp_path / "replay.nc"

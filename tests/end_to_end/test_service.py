@@ -21,8 +21,6 @@ import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.service.client import RemoteJob, Service, ServiceError
 
-pytestmark = pytest.mark.slow
-
 LONG = sweep_text(160, 100_000)
 ENDLESS = """
 [scene]

@@ -19,8 +19,6 @@ import vibroimpact as vi
 from vibroimpact.service.client import Service
 from vibroimpact.service.remote import RemoteJob, ServiceError
 
-pytestmark = pytest.mark.slow
-
 LONG = sweep_text(120, 100_000)
 
 

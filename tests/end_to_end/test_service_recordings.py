@@ -22,8 +22,6 @@ import vibroimpact as vi
 from vibroimpact.fmus.shipped import fmu_path
 from vibroimpact.service.client import RemoteRecording, ServiceError
 
-pytestmark = pytest.mark.slow
-
 COUPLED = (EXAMPLES / "two_oscillators.toml").read_text(encoding="utf-8").replace("70.0", "2.0")
 
 

@@ -16,8 +16,6 @@ from vibroimpact.orchestrator.commands.accuracy import _shown
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study import study_accuracy
 
-pytestmark = pytest.mark.slow
-
 FREE = """# rings down
 [body]
 mass = 1.0

@@ -24,7 +24,6 @@ def host(here: Machine, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return here.host(tmp_path_factory.mktemp("host"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_a_plain_c_program_runs_an_export_as_our_own_run(
     tmp_path: Path, here: Machine, host: Path, fmi: str
@@ -35,7 +34,6 @@ def test_a_plain_c_program_runs_an_export_as_our_own_run(
     assert difference(rows, expected) <= 1e-9
 
 
-@pytest.mark.slow
 def test_the_program_says_what_a_library_has_not(tmp_path: Path, here: Machine, host: Path) -> None:
     path, _ = made("impact stop", "3.0", tmp_path)
     with pytest.raises(HostFailedError, match="fmi3DoStep: expected status 0, got 3"):

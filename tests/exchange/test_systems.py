@@ -18,7 +18,6 @@ from exchange._tools import Tool, run_system
 HERE = [pair for pair in PAIRS if pair[0].package or not pair[0].missing()]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tool", "fmi", "gains"), HERE, ids=[f"{tool.name}, FMI {fmi}, {gains}" for tool, fmi, gains in HERE]
 )

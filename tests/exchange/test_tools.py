@@ -38,7 +38,6 @@ def skip_where_missing(tool: Tool) -> None:
         pytest.skip(reason)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("tool", "fmi"), SINGLE, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi in SINGLE])
 def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fmi: str, name: str) -> None:
@@ -52,7 +51,6 @@ def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fm
     assert not answer.complaints
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", STEPS)
 def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Path, name: str) -> None:
     tool = next(tool for tool in TRIED if tool.name == "FMPy")
@@ -67,7 +65,6 @@ def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Pat
     assert errors[1] <= min(ALLOWED * TOLERANCES[1], 0.1 * errors[0])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("tool", "fmi"), COUPLED, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi in COUPLED])
 def test_two_exports_that_another_tool_couples_are_our_own_run(tmp_path: Path, tool: Tool, fmi: str) -> None:
     skip_where_missing(tool)
@@ -106,7 +103,6 @@ print(*(observer.last_real_values(index, [int(sys.argv[2])])[0] for index in (0,
 """
 
 
-@pytest.mark.slow
 def test_two_exports_of_one_component_are_two_fmus_in_a_system_of_libcosim(tmp_path: Path) -> None:
     # it knows FMUs by their token, and gave both the resources, and so the start values, of one
     pytest.importorskip("libcosimpy")

@@ -25,9 +25,9 @@ def seconds_of_modules() -> dict[str, float]:
     return dict(_kept().get("modules", {}))
 
 
-def is_dear(name: str) -> bool:
-    """Return whether a test, by its name for pytest, took more than `DEAR`; one that is new has not."""
-    return name in _kept().get("dear", {})
+def dear_tests() -> dict[str, float]:
+    """Return the processor time of each test that took more than `DEAR`, s, by its name for pytest."""
+    return dict(_kept().get("dear", {}))
 
 
 def keep(modules: Mapping[str, float], tests: Mapping[str, float]) -> None:

@@ -12,7 +12,6 @@ import pytest
 from support.places import TESTS
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux alone"),
 ]
 

@@ -38,7 +38,6 @@ def compiled(native: Path) -> dict[str, int]:
     return {path.name: path.stat().st_ino for path in (native / "kept").iterdir()}
 
 
-@pytest.mark.slow
 def test_a_program_that_fails_ends_the_run_with_1_and_what_is_the_same_is_not_compiled_again(
     native: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -56,7 +55,6 @@ def test_a_program_that_fails_ends_the_run_with_1_and_what_is_the_same_is_not_co
     assert len(compiled(native).items() - second.items()) == 4
 
 
-@pytest.mark.slow
 def test_a_core_that_does_not_compile_ends_the_run_with_1_in_the_compilers_words(
     native: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,10 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 
-
-@pytest.mark.slow
 def test_every_c_test_passes_under_the_sanitizers() -> None:
     # one at a time: the other processors have tests of their own
     command = [sys.executable, str(Path(__file__).with_name("run_sanitized.py")), "--jobs", "1"]

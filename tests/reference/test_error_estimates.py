@@ -15,8 +15,6 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.accuracy import studied_scene
 from vibroimpact.orchestrator.study.references import reference_of
 
-pytestmark = pytest.mark.slow
-
 
 def mass(tables: dict[str, Any]) -> ExactBody:
     """Return the oscillator of a scene."""

@@ -88,7 +88,6 @@ def test_the_door_loads_nothing_before_it_is_asked():
     assert result.stdout == "[]\n"
 
 
-@pytest.mark.slow
 def test_the_page_of_the_door_runs_and_has_every_name(tmp_path, monkeypatch):
     page = ROOT / "docs" / "python.md"
     text = page.read_text(encoding="utf-8")
@@ -131,7 +130,6 @@ def test_scenes_are_given_as_object_file_or_tables(tmp_path):
         vi.run(3)
 
 
-@pytest.mark.slow
 def test_a_campaign_resumes_and_takes_a_client(tmp_path):
     scene = vi.Scene.from_dict(FORCED).with_sweep({"forcing.angular_frequency": np.linspace(0.7, 1.0, 7)})
     here = vi.campaign(scene, tmp_path / "here", workers=1, progress=False)

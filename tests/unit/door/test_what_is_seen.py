@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
 from support import public_names
 from support.public_names import COMMANDS, NAMES
 
 
-@pytest.mark.slow
 def test_names_have_the_signatures_and_descriptions_of_the_list():
     assert public_names.names() == NAMES.read_text(encoding="utf-8"), (
         "run python -P tests/support/public_names.py"

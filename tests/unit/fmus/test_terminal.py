@@ -25,7 +25,6 @@ def is_harmless(text: str) -> bool:
     return all(c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Zl", "Zp") for c in text)
 
 
-@pytest.mark.slow
 @given(st.text())
 def test_any_text_is_harmless_when_it_is_printed_and_plain_text_is_as_it_was(text: str) -> None:
     shown = printable(text)

@@ -108,7 +108,6 @@ def test_a_point_of_a_path_is_simulated_from_where_the_one_before_ended(file: Pa
         simulated(file.parent / "scene.toml", file.parent, 80)
 
 
-@pytest.mark.slow
 def test_a_point_of_a_later_round_is_simulated_from_where_it_began(tmp_path: Path) -> None:
     adaptive = 'points = 9, path = "up-down", adaptive = { tolerance = 0.001, at_most = 200 } }'
     text = SCENE.replace('points = 20, path = "up-down" }', adaptive)

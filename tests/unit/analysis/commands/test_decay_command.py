@@ -14,8 +14,6 @@ from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.scene import parse_scene
 
-pytestmark = pytest.mark.slow
-
 TIME = np.arange(0.0, 25.0, 0.05)
 TRUTH = Damped(omega=4.0, viscous=0.03, coulomb=0.3)
 PNG = b"\x89PNG\r\n\x1a\n"

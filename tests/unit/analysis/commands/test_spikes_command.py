@@ -97,7 +97,6 @@ def test_too_few_events_are_refused_with_the_file(tmp_path: Path) -> None:
         spikes(tmp_path / "few.nc")
 
 
-@pytest.mark.slow
 def test_the_command_prints_writes_and_draws_what_the_spikes_are(record: Path, tmp_path: Path) -> None:
     output, figure = tmp_path / "spikes.nc", tmp_path / "spikes.png"
     told = spikes(
@@ -144,7 +143,6 @@ def test_contact_time_and_the_sum_above_the_threshold_are_printed_for_each_spike
     assert float(rows[0][3]) == pytest.approx(IMPULSE * np.cos(np.pi / 6.0), rel=0.02)
 
 
-@pytest.mark.slow
 def test_a_threshold_may_be_a_number_or_a_part_and_the_method_is_said(record: Path, tmp_path: Path) -> None:
     spikes(record, "-o", tmp_path / "part.nc", "--threshold", "25%")
     spikes(record, "-o", tmp_path / "number.nc", "--threshold", "0.5", "--hysteresis", "0.4")
@@ -155,7 +153,6 @@ def test_a_threshold_may_be_a_number_or_a_part_and_the_method_is_said(record: Pa
         assert part["spike_impulse"].values == pytest.approx(number["spike_impulse"].values, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_an_event_train_has_its_intervals_only(record: Path, tmp_path: Path) -> None:
     spikes(record, "--events", "neuron", "-o", tmp_path / "neuron.nc", "--figure", tmp_path / "neuron.png")
     with xr.open_dataset(tmp_path / "neuron.nc") as data:
@@ -164,7 +161,6 @@ def test_an_event_train_has_its_intervals_only(record: Path, tmp_path: Path) -> 
     assert (tmp_path / "neuron.png").exists()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

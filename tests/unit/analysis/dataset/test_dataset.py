@@ -62,7 +62,6 @@ def written(dataset: xr.Dataset, folder: Path, name: str = "runs.nc") -> Path:
     return folder / name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("units", ["SI", "nondimensional"])
 def test_a_dataset_with_every_variable_has_nothing_for_the_cf_checker_to_say(
     units: str, tmp_path: Path
@@ -311,7 +310,6 @@ def test_sticks_and_samples_are_given_like_impacts(tmp_path: Path) -> None:
         assert opened.vibroimpact.samples(run_index=2).displacement.values.tolist() == [2.0, 2.0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("selection", [{}, {"direction": "down"}, {"angular_frequency": slice(0.5, 2.5)}])
 def test_what_is_saved_of_an_opened_dataset_opens_again(tmp_path: Path, selection: dict[str, object]) -> None:
     with open_dataset(written(up_down(), tmp_path)) as opened:

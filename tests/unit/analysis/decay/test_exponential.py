@@ -52,7 +52,6 @@ def test_the_amplitude_is_that_of_the_reference_time() -> None:
     assert late.reference_time == 10.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_standard_errors_are_the_spread_of_repeated_fits_whether_noise_is_white_or_not(memory: float) -> None:
     # Autoregressive noise of unit variance; at memory .9 its spectrum at the oscillation is 3.4 times the white one.

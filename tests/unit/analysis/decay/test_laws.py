@@ -33,7 +33,6 @@ def measured(motion: np.ndarray, noise: float, seed: int) -> DecaySamples:
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", ALL_LAWS, ids=lambda law: law.name)
 def test_the_motion_of_each_law_is_that_of_an_adaptive_integrator(law) -> None:
     # Reference: scipy's DOP853, restarted at every turning point; with a cubic spring too. In the last swing before
@@ -60,7 +59,6 @@ def test_friction_holds_the_body_off_its_equilibrium_for_good() -> None:
         np.testing.assert_allclose(moved, place, atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", ALL_LAWS, ids=lambda law: law.name)
 def test_a_noisy_decay_is_given_its_own_law_and_it_is_adequate(law) -> None:
     truth = body(*law.terms)
@@ -113,7 +111,6 @@ def test_a_law_that_would_feed_energy_in_is_never_chosen() -> None:
     assert "left out for a negative coefficient: viscous + quadratic" in " ".join(choice.words())
 
 
-@pytest.mark.slow
 def test_intervals_of_a_law_hold_the_truth_nineteen_times_in_twenty() -> None:
     law = damping_law("viscous+coulomb")
     truth = body(*law.terms)

@@ -56,7 +56,6 @@ def test_flight_times_of_a_ball_give_its_restitution():
     assert found.facts["side"] == "lower"
 
 
-@pytest.mark.slow
 def test_intervals_of_bounces_hold_the_truth_in_most_of_60_records():
     held = [
         estimate_bounces(ball(0.75, 3e-3, seed=seed)).values["flight_times"]["restitution"].covers(0.75)
@@ -93,7 +92,6 @@ def test_a_ball_that_comes_to_rest_is_read_as_a_decay_without_a_warning():
     assert decay.estimates()
 
 
-@pytest.mark.slow
 def test_estimate_of_a_ball_under_its_weight_takes_the_flight_times(tmp_path):
     scene, data, figure = (tmp_path / name for name in ("ball.toml", "ball.nc", "ball.png"))
     scene.write_text(SCENE)

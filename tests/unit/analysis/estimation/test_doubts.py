@@ -17,8 +17,6 @@ from vibroimpact.analysis.estimation.remarks import _of_contradictions
 from vibroimpact.analysis.figures.measured.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
 
-pytestmark = pytest.mark.slow
-
 METHODS = ["weak_form", "trajectory"]
 #: Forced at 2.78 times the natural frequency against a stop at rest: aperiodic, speeds of all sizes.
 PLAIN = Body(

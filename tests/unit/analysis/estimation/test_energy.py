@@ -149,7 +149,6 @@ def test_noise_in_the_squares_is_subtracted():
     assert abs(np.mean(raw) - added - noiseless) < 3.0 * chance
 
 
-@pytest.mark.slow
 def test_the_force_is_not_read_too_low_where_noise_makes_the_speeds_uncertain():
     # weighted by the measured speeds the two are 2.4 and 3.1 standard errors off on average
     parameters = Parameters(0.792, 0.1257, 61.1, 58.75, 0.108, 0.0, 0.0114)

@@ -76,7 +76,6 @@ def test_aperiodic_motion_gives_no_period_one_values_but_all_others():
     assert found.facts["trajectory_pieces"] > 1
 
 
-@pytest.mark.slow
 def test_a_lower_stop_gives_the_mirrored_answer():
     record = record_of(replace(WORKED, offset=0.2, stop_position=0.6), periods=6)
     methods = ["weak_form", "trajectory"]
@@ -198,7 +197,6 @@ def chain(noise=0.0, restitution=0.55, seed=0):
     return step * np.arange(1200), displacement + errors, shapes, natural, force
 
 
-@pytest.mark.slow
 def test_modes_of_a_chain_and_its_restitution_are_found_from_both_sensors():
     time, displacement, shapes, natural, force = chain(noise=1e-3)
     coordinates = modal_coordinates(displacement, shapes)
@@ -213,7 +211,6 @@ def test_modes_of_a_chain_and_its_restitution_are_found_from_both_sensors():
     assert found.restitution_from_energy.value == pytest.approx(found.restitution.value, abs=5e-3)
 
 
-@pytest.mark.slow
 def test_a_nearly_elastic_stop_is_estimated_though_noise_alone_would_let_it_gain_energy():
     # restitution .995 with a standard error of .003: draws of the noise gain energy, the record does not
     time, displacement, shapes, _, _ = chain(noise=5e-3, restitution=0.995, seed=1)
@@ -230,7 +227,6 @@ def test_energies_that_contradict_each_other_are_reported_not_clipped():
         modal_coordinates(np.zeros((1, 5)), np.ones((1, 2)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "stop", "impacts"), [(2.6, 0.3, 2), (2.6, 0.0, 3)])
 def test_motion_of_several_impacts_in_several_periods_gives_the_truth(ratio, stop, impacts):
     # P(2,4) and P(3,3): flights of different lengths, impacts of different strengths
@@ -246,7 +242,6 @@ def test_motion_of_several_impacts_in_several_periods_gives_the_truth(ratio, sto
             assert values[name].standard_error < 0.01
 
 
-@pytest.mark.slow
 def test_a_clock_that_drifts_is_hinted_at_and_found_when_asked_for():
     record = record_of(THESIS, periods=60)
     channel = record.channel(0.005)
@@ -259,7 +254,6 @@ def test_a_clock_that_drifts_is_hinted_at_and_found_when_asked_for():
     assert values["restitution"].value == pytest.approx(0.89, abs=0.004)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ratio", "stop", "restitution"),
     [(0.69, -0.2, 0.66), pytest.param(0.72, 0.0, 0.8, marks=pytest.mark.long)],

@@ -54,7 +54,6 @@ def test_linear_form_reproduces_the_worked_example():
     assert np.all(np.std(estimates, axis=0) < [0.0008, 0.004])
 
 
-@pytest.mark.slow
 def test_weighting_by_the_noise_halves_the_scatter_and_takes_the_bias_away():
     record = record_of(THESIS, periods=4)
     plain, whitened, searched, stated = [], [], [], []
@@ -130,7 +129,6 @@ def test_exact_flow_on_the_flights_gives_restitution_speed_and_stop():
     assert not fit.reading.periodic
 
 
-@pytest.mark.slow
 def test_standard_errors_of_the_reading_are_its_scatter():
     record = record_of(WORKED, periods=5)
     values, stated = [], []

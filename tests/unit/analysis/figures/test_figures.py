@@ -345,7 +345,6 @@ def test_a_bifurcation_of_a_single_run_is_refused(tmp_path: Path) -> None:
         figures.draw(opened(sampled_run(), tmp_path), "bifurcation")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("ending", "start"), [("png", PNG), ("pdf", b"%PDF"), ("svg", b"<?xml")])
 def test_the_ending_chooses_the_format(ending: str, start: bytes, tmp_path: Path) -> None:
     figures.save(figures.draw(opened(up_down(), tmp_path)), tmp_path / f"figure.{ending}")
@@ -380,7 +379,6 @@ def test_plot_help_has_an_example() -> None:
     assert "Example: vibroimpact plot" in done.output
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [

@@ -253,7 +253,6 @@ def replay(folder: Path, *, named: bool = True) -> Path:
     return folder / "fit.nc"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("recording", ["a1.nc", "a1", "board_2"])
 def test_a_recording_that_was_not_fitted_is_drawn_by_its_name_which_the_figure_says(
     recording: str, tmp_path: Path

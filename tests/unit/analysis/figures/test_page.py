@@ -25,7 +25,6 @@ def sweep(folder: Path) -> xr.Dataset:
     return open_dataset(folder / "runs.nc")
 
 
-@pytest.mark.slow
 def test_a_matplotlibrc_of_the_current_folder_is_not_read(tmp_path: Path) -> None:
     # what matplotlib itself cannot import with
     (tmp_path / "matplotlibrc").write_bytes(b"lines.linewidth: 9\nno.such: 1\n\xff\xfe\x00")
@@ -37,7 +36,6 @@ def test_a_matplotlibrc_of_the_current_folder_is_not_read(tmp_path: Path) -> Non
     assert (tmp_path / "figure.png").read_bytes() == (tmp_path / "here.png").read_bytes()
 
 
-@pytest.mark.slow
 def test_what_a_user_has_set_for_his_own_figures_changes_none_of_ours(tmp_path: Path) -> None:
     dataset = sweep(tmp_path)
     figures.save(figures.draw(dataset), tmp_path / "plain.png")

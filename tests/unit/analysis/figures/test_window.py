@@ -130,7 +130,6 @@ def test_the_frequency_of_a_body_is_not_taken_for_that_of_the_forcing() -> None:
     assert forcing_rate(dataset, dataset.vibroimpact.samples()) == pytest.approx(6.0 * np.pi)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene", ["", "body = 3", "[[body]]\n[[forcing]]\n", "forcing = [", "[record]\ntime_series = 1"]
 )

@@ -128,7 +128,6 @@ def test_other_content_under_an_old_name_is_looked_at_again(tmp_path: Path, prob
     assert probes == ["runs.nc", "runs.nc"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "said"),
     [
@@ -175,7 +174,6 @@ def test_a_file_whose_reading_does_not_end_is_given_up(
     assert not (tmp_path / "figure.png").exists()
 
 
-@pytest.mark.slow
 def test_a_killed_program_leaves_no_process_that_reads(tmp_path: Path, reader: Callable[[str], None]) -> None:
     reader("open(path + '.reader', 'w').write(str(os.getpid())); time.sleep(60)")
     path = tmp_path / "file.nc"
@@ -293,7 +291,6 @@ def test_a_cache_that_others_may_write_is_not_believed(
     assert probes == ["runs.nc", "runs.nc"]
 
 
-@pytest.mark.slow
 def test_a_process_made_by_fork_has_a_server_of_its_own(tmp_path: Path) -> None:
     code = (
         "import os, sys; from vibroimpact.analysis.files.probing import check_sound, _server\n"

@@ -32,7 +32,6 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
 def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_is_not(temporary: Path) -> None:
     with warm.start(OWNER, "wait") as owner:
         assert owner.stdout is not None
@@ -47,7 +46,6 @@ def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_is_not
     assert not os.listdir(temporary)
 
 
-@pytest.mark.slow
 def test_a_process_that_ends_leaves_no_folder(temporary: Path) -> None:
     done = warm.run(OWNER, "end")
     assert done.returncode == 0, done.stderr
@@ -80,7 +78,6 @@ def test_a_sweep_leaves_folders_of_other_users(temporary: Path) -> None:
     assert folder.exists()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_folders_of_many_processes_that_start_and_die_at_once_do_not_disturb_each_other(
     temporary: Path,

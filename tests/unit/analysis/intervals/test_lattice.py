@@ -19,7 +19,6 @@ def spike_train(
     return np.sort(np.concatenate([kept, true[extra] + rng.random(len(extra))]))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("missed", "spurious", "jitter", "drift"),
     [(0.1, 0.0, 0.01, 0.0), (0.05, 0.02, 0.02, 0.0), (0.3, 0.1, 0.005, 0.0), (0.1, 0.04, 0.01, 3.0)],

@@ -174,7 +174,6 @@ def test_intervals_on_a_coarse_grid_have_a_verdict_without_their_first_embedding
     assert "without m = 1" in printed(report)
 
 
-@pytest.mark.slow
 def test_the_figure_shows_delay_points_density_and_every_embedding(tmp_path: Path) -> None:
     report = interval_report(np.cumsum(np.random.default_rng(6).exponential(size=400)))
     figure = draw_intervals(report)

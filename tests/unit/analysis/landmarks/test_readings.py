@@ -99,7 +99,6 @@ def test_scenes_without_closed_form_landmarks_are_refused(old: str, new: str, me
         ImpactOscillator.from_scene(SCENE.replace(old, new))
 
 
-@pytest.mark.slow
 def test_every_landmark_is_read_within_two_grid_steps(sweep: xr.Dataset) -> None:
     readings = bifurcation_readings(sweep)
     assert [reading.name for reading in readings] == [

@@ -48,7 +48,6 @@ def test_half_sines_have_the_contact_time_impulse_and_peak_of_their_formulas() -
     assert data["spike_impulse_above"].values == pytest.approx(0.992774 * 1.27324e-3, rel=2e-3)
 
 
-@pytest.mark.slow
 def test_a_sampled_peak_falls_short_by_no_more_than_its_bound_and_the_band_limited_one_is_nearer() -> None:
     # deficit 1 - cos(pi h / (2 length)) = .0012045 at 40 kHz; offsets over a whole sampling interval
     sampled, limited = [], []
@@ -96,7 +95,6 @@ def noise(kind: str, rng: np.random.Generator, length: int) -> np.ndarray:
     return rng.standard_t(3.0, length)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["white", "pink", "laplace", "student"])
 def test_noise_alone_has_no_spikes_and_no_cycle(kind: str) -> None:
     # 25 records with .1 false alarms stated in each: 2.5 are expected from a law that is met exactly; the four
@@ -111,7 +109,6 @@ def test_noise_alone_has_no_spikes_and_no_cycle(kind: str) -> None:
     assert alarms <= 2
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["white", "laplace", "student"])
 def test_single_samples_of_noise_pass_the_threshold_as_often_as_stated(kind: str) -> None:
     # with one sample enough for a spike, 60 records at .1 false alarms have 6 at most in expectation;
@@ -267,7 +264,6 @@ def test_velocity_needs_a_mass_for_a_force_and_none_for_an_acceleration() -> Non
         spike_report(shaken, None, Mechanics(restitution=1.2))
 
 
-@pytest.mark.slow
 def test_known_impulses_give_the_sensitivity_that_was_used() -> None:
     # 21.8 mV/N is the load cell of thesis section 5.3
     rng = np.random.default_rng(16)
@@ -319,7 +315,6 @@ def test_uneven_samples_take_a_threshold_and_refuse_a_cycle() -> None:
         identify(uneven, SpikeSettings(method="cycle_median"))
 
 
-@pytest.mark.slow
 def test_time_above_a_threshold_is_that_of_the_half_sine_at_any_threshold() -> None:
     _, signal = half_sines()
     for threshold in (0.05, 0.5, 1.5, 2.2):

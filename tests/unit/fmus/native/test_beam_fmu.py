@@ -217,7 +217,6 @@ def collocated_rule(restitution: float) -> tuple[NDArray[np.float64], NDArray[np
     return rule, np.linalg.svd(rule)[2][0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("projection", "most"), [(1, 1.0), (COLLOCATION, 1.46313)])
 def test_collocation_turns_round_the_contact_alone_and_may_create_energy(
     projection: int, most: float

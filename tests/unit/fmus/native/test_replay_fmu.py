@@ -273,7 +273,6 @@ def test_equal_signals_make_equal_files_and_others_another_token(tmp_path: Path)
 # What it says of itself.
 
 
-@pytest.mark.slow
 def test_the_description_is_valid_and_says_what_importers_need(fmu: Path) -> None:
     assert validate(fmu) == ()
     assert check_fmu(fmu) == ()

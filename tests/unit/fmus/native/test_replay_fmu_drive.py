@@ -145,7 +145,6 @@ macro_step = 3.3333333333333335e-4
 """
 
 
-@pytest.mark.slow
 def test_a_scene_plays_a_record_to_its_end_and_beyond(fmu: Path, tmp_path: Path) -> None:
     shutil.copy(fmu, tmp_path / "record.fmu")
     (tmp_path / "scene.toml").write_text(SCENE)

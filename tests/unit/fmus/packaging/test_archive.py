@@ -77,7 +77,6 @@ def test_a_cache_with_a_file_missing_is_repaired(tmp_path: Path) -> None:
     assert binary_path(unpack(fmu.source)).read_bytes() == b"code"
 
 
-@pytest.mark.slow
 def test_many_processes_may_unpack_the_same_fmu_at_once(tmp_path: Path, cache: Path) -> None:
     path = written(tmp_path / "M.fmu", {BINARY: b"x" * 3_000_000})
     code = (

@@ -54,7 +54,6 @@ def test_a_source_that_moves_makes_the_build_out_of_date(sources: Path) -> None:
     assert not is_current(BUILT, native=sources)
 
 
-@pytest.mark.slow
 def test_an_error_in_the_c_is_told_in_the_compilers_words(sources: Path, tmp_path: Path) -> None:
     keep_one_component(sources)
     (sources / "core" / "zz_wrong.c").write_text("int wrong(void) { return undeclared_name; }\n")
@@ -91,7 +90,6 @@ def test_a_machine_without_a_compiler_is_told_what_to_install(monkeypatch: pytes
         find_compiler()
 
 
-@pytest.mark.slow
 def test_the_command_builds_says_what_is_out_of_date_and_exports_what_the_fmu_hides(
     sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

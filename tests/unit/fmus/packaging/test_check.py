@@ -41,7 +41,6 @@ def with_text(old: str, new: str) -> Callable[[str, bytes], tuple[str, bytes]]:
     return change
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", VERSIONS)
 @pytest.mark.parametrize("name", components())
 def test_every_fmu_of_the_package_passes(name: str, fmi: str) -> None:
@@ -115,7 +114,6 @@ def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path) -> None:
     assert problem.startswith("expected an FMU (a zip archive), got")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", VERSIONS)
 @pytest.mark.parametrize("contacts", [0, 1, 2])
 def test_an_exported_fmu_has_just_the_contacts_asked_for_and_passes(
@@ -130,7 +128,6 @@ def test_an_exported_fmu_has_just_the_contacts_asked_for_and_passes(
     assert (unpack(path).resources / "sizes.txt").read_text() == f"contacts {contacts}\n"
 
 
-@pytest.mark.slow
 def test_an_export_needs_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("VIBROIMPACT_CC", "no-such-compiler")

@@ -94,7 +94,6 @@ def test_without_a_library_and_without_zig_it_is_said_what_to_install(
     assert not (tmp_path / "x.fmu").exists()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="the extra cross is not installed")
 @pytest.mark.parametrize("name", TARGETS)
 def test_zig_compiles_a_library_for_each_platform_and_it_is_kept(

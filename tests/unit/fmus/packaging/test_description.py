@@ -155,7 +155,6 @@ def test_value_references_count_through_the_file_block_by_block(small: Component
     assert [v.value_reference for v in small.variables] == list(range(9))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("contacts", [0, 1, 2])
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_fmpy_finds_nothing_wrong_with_either_version(

@@ -21,8 +21,6 @@ from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.members import REFERENCES_MEMBER, SIZES_MEMBER
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 
-pytestmark = pytest.mark.slow
-
 BODIES = {"Beam": "modes", "Chain": "masses"}
 SIZES = [(1, 0), (3, 1), (64, 8)]
 

@@ -109,14 +109,12 @@ def ball(tmp_path: Path) -> Iterator[FMU2Slave]:
     fmu.freeInstance()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "fmi"), fmu_factory.MADE)
 def test_each_made_fmu_is_valid_and_exports_the_whole_standard(name: str, fmi: str, tmp_path: Path) -> None:
     path = WRITERS[name](tmp_path, fmi)
     assert check_fmu(path) == ()
 
 
-@pytest.mark.slow
 def test_each_is_compiled_once_and_has_the_same_bytes_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -216,7 +214,6 @@ def test_without_a_fault_it_integrates_to_the_end(tmp_path: Path, fmi: str) -> N
     assert result.stdout.count("answer") == 5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize(("fault", "number"), [("error", 1), ("fatal", 2)])
 def test_an_error_is_logged_and_returned_at_its_time(
@@ -230,7 +227,6 @@ def test_an_error_is_logged_and_returned_at_its_time(
     assert "FMICallException" in result.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize(("fault", "signal"), [("segfault", 11), ("abort", 6), ("exit", 0)])
 def test_a_crash_ends_the_process_in_the_fourth_step(
@@ -242,7 +238,6 @@ def test_a_crash_ends_the_process_in_the_fourth_step(
     assert result.stdout.rstrip().endswith("step 3")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_a_hang_never_comes_back(tmp_path: Path, fmi: str) -> None:
     with warm.start(*driver(tmp_path, fmi, "hang")) as process:
@@ -285,7 +280,6 @@ def initialize_slave(fmu: FMU3Slave) -> None:
     fmu.enterStepMode()
 
 
-@pytest.mark.slow
 def test_a_million_lines_are_logged_in_one_step(tmp_path: Path) -> None:
     fmu, lines = faulty(tmp_path, "3.0", 5)
     fmu.doStep(0.0, 0.1)

@@ -55,7 +55,6 @@ def test_every_file_that_is_named_is_there_and_nothing_is_included_that_is_not(
                 assert included in texts or beside in texts or included.startswith(f"fmi{fmi[0]}"), line
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "fmi"), [("Oscillator", "2.0"), pytest.param("Beam", "3.0", marks=pytest.mark.long)]
 )

@@ -177,7 +177,6 @@ def test_the_description_is_valid_and_says_what_importers_need(make) -> None:  #
     assert force.variable.name == "applied_force"
 
 
-@pytest.mark.slow
 def test_equal_laws_make_equal_files(make) -> None:  # type: ignore[no-untyped-def]
     assert make(SLOWING, "one").read_bytes() == make(SLOWING, "two").read_bytes()
     assert make(FAILING, "three").read_bytes() != make(SLOWING, "two").read_bytes()
@@ -190,7 +189,6 @@ def test_the_template_is_a_law(tmp_path: Path, opened) -> None:  # type: ignore[
     assert answers == sorted(answers, reverse=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -262,7 +260,6 @@ def test_the_fmu_runs_where_pythonfmu_is_not_installed(make, tmp_path: Path) -> 
     assert float(result.stdout) == pytest.approx(0.8)
 
 
-@pytest.mark.slow
 def test_a_thousand_lives_of_a_python_component_in_one_process_take_no_more_memory(tmp_path: Path) -> None:
     import psutil  # type: ignore[import-untyped, unused-ignore]
 

@@ -21,8 +21,6 @@ from vibroimpact.hardware.rig.journal import read_journal
 RIG = ROOT / "examples" / "rig" / "oscillator.toml"
 RATE = 20_000
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:

@@ -61,7 +61,6 @@ def is_told(recording: Recording) -> bool:
     return "the text ends with" in "\n".join(recording.remarks)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("text", WRITERS.values(), ids=WRITERS)
 def test_up_to_90_bytes_cut_off_are_never_wrong_and_silent(text: str, tmp_path: Path) -> None:
     whole = imported(tmp_path, text.encode())

@@ -134,7 +134,6 @@ def test_the_whole_files_of_these_tests_are_imported(ending: str) -> None:
     assert import_or_refuse(ending, WHOLE[ending]) is None
 
 
-@pytest.mark.slow
 @settings(max_examples=120)
 @given(damaged())
 def test_a_damaged_file_is_imported_or_refused_and_nothing_else(case: tuple[str, bytes]) -> None:

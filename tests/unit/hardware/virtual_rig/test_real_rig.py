@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from support.places import ROOT
 
 from vibroimpact.hardware.virtual_rig.serving import served
@@ -19,7 +18,6 @@ TABLE = [f"{FOLDER}/test_conformance.py", f"{FOLDER}/test_conformance_refusals.p
 TOO_LATE = "not are_late and not too_late and not runs_empty and not written_over"
 
 
-@pytest.mark.slow
 def test_the_table_passes_on_a_rig_that_is_only_known_by_its_address(tmp_path: Path) -> None:
     examples = ROOT / "examples" / "rig"
     text = (examples / "oscillator.toml").read_text(encoding="utf-8")

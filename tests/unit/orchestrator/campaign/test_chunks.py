@@ -48,7 +48,6 @@ def run_all(work: Work, chunks: list[tuple[int, int]], branch_length: int) -> li
     return paths
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", ["independent", "up", "down", "up-down"])
 def test_rows_do_not_depend_on_how_runs_are_cut_into_chunks(tmp_path: Path, path: str) -> None:
     text = plane_text(7, 2, path, milliseconds=0.01)

@@ -25,8 +25,6 @@ from vibroimpact.orchestrator.campaign.cluster import MOST_STARTS, open_workers
 from vibroimpact.orchestrator.campaign.pool import MOST_DEATHS
 from vibroimpact.orchestrator.campaign.progress import Progress
 
-pytestmark = pytest.mark.slow
-
 kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 
 

@@ -20,8 +20,6 @@ from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
 
-pytestmark = pytest.mark.slow
-
 BODY = """
 [scene]
 title = "{title}"

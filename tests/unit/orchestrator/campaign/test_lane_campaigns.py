@@ -69,7 +69,6 @@ def test_a_campaign_in_lanes_that_is_interrupted_has_the_bits_of_one_that_is_not
     assert (rows.impact_count.values > 0).any()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and sessions")
 @pytest.mark.parametrize(
     ("path", "points"), [("independent", 12), pytest.param("up-down", 6, marks=pytest.mark.long)]

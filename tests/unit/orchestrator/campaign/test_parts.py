@@ -76,7 +76,6 @@ def test_a_flipped_bit_is_found_before_the_part_is_opened_and_its_points_are_com
     assert_same_rows(half / "dataset.nc", expected)
 
 
-@pytest.mark.slow
 def test_a_part_that_is_damaged_after_it_was_written_is_computed_again_by_the_same_command(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,7 +93,6 @@ def test_a_part_that_is_damaged_after_it_was_written_is_computed_again_by_the_sa
     assert_same_rows(half / "dataset.nc", expected)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("hashed", [False, True])
 def test_a_part_whose_values_do_not_fit_is_no_dead_end(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch, hashed: bool
@@ -114,7 +112,6 @@ def test_a_part_whose_values_do_not_fit_is_no_dead_end(
     assert_same_rows(half / "dataset.nc", expected)
 
 
-@pytest.mark.slow
 def test_a_part_of_version_0_1_without_a_hash_is_taken(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

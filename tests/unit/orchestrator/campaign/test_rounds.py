@@ -18,8 +18,6 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_scene
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import parse_scene
 
-pytestmark = pytest.mark.slow
-
 BODY = """
 [scene]
 units = "nondimensional"

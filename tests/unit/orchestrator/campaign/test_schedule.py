@@ -1,7 +1,5 @@
 from types import SimpleNamespace
 
-import pytest
-
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.schedule import (
     CHUNK_SECONDS,
@@ -47,7 +45,6 @@ def test_a_slow_point_makes_a_chunk_of_its_own() -> None:
     assert next_chunk(schedule).count == 1
 
 
-@pytest.mark.slow
 def test_quick_points_do_not_make_a_part_that_fills_the_memory() -> None:
     schedule = ChunkSchedule(branches(10_000_000), [], workers=2)
     first = next_chunk(schedule)

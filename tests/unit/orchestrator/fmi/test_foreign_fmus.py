@@ -55,7 +55,6 @@ def bounces_of_the_rule(restitution: float, end: float) -> list[float]:
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_every_bounce_inside_a_step_of_the_example_is_found_at_its_instant(
     folder: Path, tmp_path: Path, fmi: str
@@ -230,7 +229,6 @@ def test_a_component_that_asks_for_the_end_inside_a_step_ends_the_run_there(
         np.testing.assert_allclose(found.samples[:, 1], found.samples[:, 0], rtol=0, atol=1e-12)  # y' = 1
 
 
-@pytest.mark.slow
 def test_a_component_that_ends_a_repeated_step_early_is_an_error_and_no_wrong_sample(folder: Path) -> None:
     # it counts its calls in the process, not in its state: sampled inside a step, it ended short of the sample
     text = LIES.format(major="3", fault="end_short", early=0, record='variables = ["culprit.y"]\nrate = 100')

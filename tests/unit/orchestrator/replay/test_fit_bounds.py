@@ -13,8 +13,6 @@ from vibroimpact.fmus.errors import EstimationError
 from vibroimpact.orchestrator.replay import Replayer, ReplayFit, fit_replay
 from vibroimpact.orchestrator.scene import parse_scene
 
-pytestmark = pytest.mark.slow
-
 TIME = np.arange(2000) * 1e-5
 NO_GAIN = BOARD.replace("gain = 0.9", "gain = 0.0")
 

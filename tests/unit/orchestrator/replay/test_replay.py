@@ -102,7 +102,6 @@ def test_coupled_by_a_replay_fmu_and_fused_are_one_motion(tmp_path: Path) -> Non
     np.testing.assert_allclose(together, alone, atol=1e-9 * np.abs(alone).max())
 
 
-@pytest.mark.slow
 def test_a_fit_finds_the_truth_within_its_errors_through_lag_polarity_and_offset(tmp_path: Path) -> None:
     path = recorded(tmp_path)
     keys = fit_keys(scene(), "body.frequency, body.damping_ratio, sensor.gain")
@@ -117,7 +116,6 @@ def test_a_fit_finds_the_truth_within_its_errors_through_lag_polarity_and_offset
     assert comparison.variance > 99.9
 
 
-@pytest.mark.slow
 def test_a_fit_far_off_begins_at_the_measured_frequency(tmp_path: Path) -> None:
     path = recorded(tmp_path)
     far = scene(BOARD.replace("frequency = 800.0", "frequency = 300.0"))
@@ -134,7 +132,6 @@ def test_numbers_that_change_the_motion_alike_are_refused(tmp_path: Path) -> Non
         fit_replay(replayers, ["body.flexural_rigidity", "body.mass_per_length"])
 
 
-@pytest.mark.slow
 def test_the_gain_of_amplitude_dependence_shows_where_there_is_one(tmp_path: Path) -> None:
     truth = {"body.frequency": 823.0, "body.frequency_slope": -200.0}
     curved = scene(BOARD + "drive_offset = 0.0").at(truth)
@@ -235,7 +232,6 @@ def test_steps_stop_at_every_sample_of_the_drive_and_are_never_too_long() -> Non
     assert instants[-1] == pytest.approx(0.7, abs=0.04)
 
 
-@pytest.mark.slow
 def test_the_dataset_of_a_replay_holds_signals_scores_and_the_fit(tmp_path: Path) -> None:
     path = recorded(tmp_path)
     with opened_replays(scene(), [path]) as replayers:
@@ -252,7 +248,6 @@ def test_the_dataset_of_a_replay_holds_signals_scores_and_the_fit(tmp_path: Path
         assert {"drive_1", "recording", "use"} <= set(found.variables)
 
 
-@pytest.mark.slow
 def test_noise_of_the_drive_is_in_the_standard_errors(tmp_path: Path) -> None:
     # what it excites rings on for hundreds of samples: without it the errors were 16 times too small
     reading = simulated({"body.frequency": 823.0}, tmp_path)
@@ -330,7 +325,6 @@ def test_a_problem_with_its_file_is_a_new_error(tmp_path: Path) -> None:
     assert raised.value.__cause__ is not raised.value
 
 
-@pytest.mark.slow
 def test_a_number_that_changes_nothing_is_refused(tmp_path: Path) -> None:
     # with its frequency given, the length of a board on a moving base is nothing that an accelerometer sees
     path = recorded(tmp_path)

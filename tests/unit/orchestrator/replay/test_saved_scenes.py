@@ -40,7 +40,6 @@ def replay(*arguments: str | Path) -> int:
     return int(left.value.code or 0)
 
 
-@pytest.mark.slow
 def test_a_saved_scene_gives_the_motion_of_the_fit_from_any_folder_also_when_saved_again(
     folder: Path,
 ) -> None:

@@ -235,7 +235,6 @@ def test_noise_and_conversion_are_those_of_their_tables(tmp_path: Path) -> None:
     assert found.load_cell.attrs["noise_seed"] == 3
 
 
-@pytest.mark.slow
 def test_a_seed_gives_the_same_noise_on_every_worker_and_each_run_its_own(tmp_path: Path) -> None:
     tables = (SENSOR, EXCITER, CELL, DAQ, NOISE)
     swept = '[sweep]\n"forcing.amplitude" = { start = 2.9, stop = 3.0, points = 3, path = "up-down" }\n'

@@ -178,7 +178,6 @@ def test_run_with_set_leaves_what_was_run_in_the_dataset(tmp_path: Path) -> None
     assert "holds something else" in other.stderr
 
 
-@pytest.mark.slow
 def test_a_campaign_with_another_set_is_told_what_changed(tmp_path: Path) -> None:
     scene = tmp_path / "sweep.toml"
     scene.write_text(frequency_text(3))

@@ -177,7 +177,6 @@ def many(pattern: str, count: int) -> str:
     return "".join(pattern.format(number) for number in range(count))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "count"),
     [

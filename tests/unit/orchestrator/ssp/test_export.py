@@ -135,7 +135,6 @@ def test_copies_of_the_swept_set_are_a_sweep_and_one_of_them_is_a_point(system: 
     assert [axis.key for axis in one.sweep] == ([] if springs else ["connection[1].gain"])
 
 
-@pytest.mark.slow
 def test_the_scene_comes_back_with_its_sweep_and_gives_the_same_dataset(system: Path) -> None:
     ours, theirs = vi.Scene.from_dict(TWO), load_system(system).scene
     assert theirs.sweep == ours.sweep

@@ -256,7 +256,6 @@ def scene_of_two(folder: Path) -> Path:
     return folder / "two.toml"
 
 
-@pytest.mark.slow
 def test_what_another_tool_has_changed_in_an_archive_of_ours_counts(
     tmp_path: Path, fmus: dict[str, Path]
 ) -> None:
@@ -271,7 +270,6 @@ def test_what_another_tool_has_changed_in_an_archive_of_ours_counts(
         load_system(changed(path, tmp_path / "g.ssp", "resources/a.fmu", gain))
 
 
-@pytest.mark.slow
 def test_an_imported_scene_lies_beside_its_fmus_and_overwrites_nothing(
     tmp_path: Path, fmus: dict[str, Path]
 ) -> None:

@@ -32,8 +32,6 @@ from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTri
 from vibroimpact.orchestrator.study.way import Trial
 from vibroimpact.orchestrator.study.ways import remarks_on, ways_of
 
-pytestmark = pytest.mark.slow
-
 P11: dict[str, Any] = {
     "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
     "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},

@@ -58,7 +58,6 @@ def test_a_free_mass_needs_its_forcing() -> None:
     assert "forcing" in changes_of(rigid)
 
 
-@pytest.mark.slow
 def test_what_is_kept_changes_no_motion_and_what_moves_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vibroimpact.orchestrator.study.effects.PAIRS", 2)
     scene = Scene.from_dict(BEAM)
@@ -76,7 +75,6 @@ def test_a_dataset_that_has_no_place_is_refused_before_anything_runs(monkeypatch
         vi.effects(BEAM, "nowhere/parts.nc")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tolerance"),
     [

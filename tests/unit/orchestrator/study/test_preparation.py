@@ -240,7 +240,6 @@ def test_points_of_a_sweep_that_are_chaotic_are_told_apart() -> None:
     assert "points of the sweep" in str(found["estimated_error_of"])
 
 
-@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(
     stiffness=st.floats(1e2, 1e4),
