@@ -1,0 +1,25 @@
+"""Where a dataset comes from, and what finding that out takes."""
+
+from __future__ import annotations
+
+import subprocess
+from typing import Any
+
+import pytest
+
+from vibroimpact.orchestrator.campaign import provenance
+
+
+def test_git_is_asked_once_in_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+    run = subprocess.run
+
+    def noted(command: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
+        asked.append(command)
+        return run(command, **options)
+
+    monkeypatch.setattr(subprocess, "run", noted)
+    provenance.git_commit.cache_clear()
+    commits = {provenance.git_commit() for _ in range(3)}
+    assert len(commits) == 1
+    assert [command[0] for command in asked] == ["git"]
