@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.assembling import new_axis
 from vibroimpact.analysis.dataset.results import Rows, described
 from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.analysis.recording.channels import QUALITY_FLAGS
@@ -104,7 +105,7 @@ def comparison_dataset(comparisons: Sequence[Comparison]) -> xr.Dataset:
     for name, axis in axes.values():
         known = {"interval_uncertainty": axis.interval_uncertainty, "trigger": axis.trigger}
         attrs = {"units": "s", "long_name": "time of the recording", **known}
-        coordinates[name] = (name, axis.time, attrs)
+        coordinates[name] = new_axis(name, axis.time, attrs)
     remarks = [f"{name}: {line}" for name, c in zip(names, comparisons, strict=True) for line in c.remarks]
     return xr.Dataset(variables, coordinates, {"remarks": "\n".join(remarks)})
 
