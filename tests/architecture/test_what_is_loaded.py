@@ -205,7 +205,6 @@ def answers(orders: list[dict[str, object]], folder: Path) -> list[list[tuple[in
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("row", [*LIGHT, *WARM])
 def test_a_command_or_name_loads_no_heavy_package_that_it_does_not_use(
     row: str, loaded: dict[str, tuple[int, set[str], str]]
@@ -216,7 +215,6 @@ def test_a_command_or_name_loads_no_heavy_package_that_it_does_not_use(
     assert modules <= set(may_load.split())
 
 
-@pytest.mark.slow
 def test_a_package_that_is_used_is_seen_to_be_loaded(loaded: dict[str, tuple[int, set[str], str]]) -> None:
     assert "scipy" in loaded["run drawn.toml -o drawn.nc"][1]
     assert "matplotlib" in loaded["plot swept.nc -o swept.png"][1]
