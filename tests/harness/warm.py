@@ -195,6 +195,7 @@ class Copy:
                 assert ready, "the warm process for commands has ended"
                 self._connection.settimeout(None)
                 told = json.loads(self._answers.readline())
+                self._answers.close()
                 self._connection.close()
                 self.returncode = int(told["code"])
                 _seconds += told["seconds"]
