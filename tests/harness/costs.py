@@ -106,7 +106,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     costs, seconds = config.stash[COSTS], processor_time()
     costs.yardsticks.append(yardstick())
     config.stash[TOTAL] = seconds, seconds / statistics.mean(costs.yardsticks)
-    if config.getoption("keep_costs") and session.exitstatus == pytest.ExitCode.OK:
+    ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
+    if config.getoption("keep_costs") and ended:
         kept_costs.keep(costs.modules, costs.tests)
     if config.getoption("budget") and session.exitstatus == pytest.ExitCode.OK and _excess(config) > MAY_GROW:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -42,7 +42,8 @@ def refuse_threads() -> None:
 def start_server() -> None:
     """Start the warm process, which imports while the caller goes on; copies of the caller use it too."""
     global _server
-    folder = tempfile.TemporaryDirectory(prefix="warm-")
+    # the name of a socket is short
+    folder = tempfile.TemporaryDirectory(prefix="warm-", dir="/tmp")
     path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.Popen(
         [sys.executable, "-P", "-c", PROGRAM, str(Path(folder.name, "socket"))],
