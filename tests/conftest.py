@@ -13,7 +13,7 @@ from typing import Any
 import hypothesis
 import pytest
 from _pytest.doctest import DoctestModule
-from harness.kept_costs import dear_tests
+from harness.kept_costs import dear_tests, whole_modules
 from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
@@ -61,8 +61,12 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> Any:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("fast"):
         return
-    dear = dear_tests()
-    left_out = [item for item in items if item.nodeid in dear or item.get_closest_marker("long")]
+    dear, whole = dear_tests(), whole_modules()
+    left_out = [
+        item
+        for item in items
+        if item.nodeid in dear or item.nodeid.partition("::")[0] in whole or item.get_closest_marker("long")
+    ]
     config.stash[LEFT_OUT] = len(left_out)
     config.hook.pytest_deselected(items=left_out)
     those = set(left_out)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 
 class Shares:
@@ -19,9 +19,17 @@ class Shares:
     seconds : mapping of str to float
         Wall time of a module, s, as far as it is known; others count as nothing.
     workers : int
+    whole : collection of str
+        Modules that one worker runs alone.
     """
 
-    def __init__(self, modules: Sequence[str], seconds: Mapping[str, float], workers: int) -> None:
+    def __init__(
+        self,
+        modules: Sequence[str],
+        seconds: Mapping[str, float],
+        workers: int,
+        whole: Collection[str] = frozenset(),
+    ) -> None:
         groups: dict[str, deque[int]] = {}
         for number, module in enumerate(modules):
             groups.setdefault(module, deque()).append(number)
@@ -30,6 +38,7 @@ class Shares:
             for module, group in groups.items()
             for number in group
         }
+        self._modules, self._whole = modules, whole
         self._waiting = deque(sorted(groups.values(), key=self._left, reverse=True))
         self._begun: list[deque[int]] = [deque() for _ in range(workers)]
 
@@ -46,7 +55,8 @@ class Shares:
         return own.popleft() if own else None
 
     def _take_over(self, own: deque[int]) -> None:
-        busiest = max(self._begun, key=lambda group: (self._left(group), len(group)))
+        shared = [group for group in self._begun if group and self._modules[group[0]] not in self._whole]
+        busiest = max(shared, key=lambda group: (self._left(group), len(group)), default=own)
         for _ in range((len(busiest) + 1) // 2):
             own.appendleft(busiest.pop())
 

@@ -9,8 +9,13 @@ from pathlib import Path
 from typing import Any
 
 FILE = Path(__file__).with_name("costs_of_tests.json")
-DEAR = 0.08
+DEAR = 0.15
 """Processor time of a test, its fixtures and its programs, s, above which `--fast` leaves it out."""
+DEAR_FIXTURE = 2.0
+"""Processor time of a test, s, above which it may have made what other tests of its module use, too.
+
+Such a module is not shared out among workers, each of which would make it again, and `--fast` leaves all of it out.
+"""
 SHORT = 0.1
 """Wall time of a module, s, below which its place in the order does not matter."""
 
@@ -28,6 +33,12 @@ def seconds_of_modules() -> dict[str, float]:
 def dear_tests() -> dict[str, float]:
     """Return the processor time of each test that took more than `DEAR`, s, by its name for pytest."""
     return dict(_kept().get("dear", {}))
+
+
+@functools.cache
+def whole_modules() -> frozenset[str]:
+    """Return the modules with a test above `DEAR_FIXTURE`."""
+    return frozenset(name.partition("::")[0] for name, took in dear_tests().items() if took > DEAR_FIXTURE)
 
 
 def keep(modules: Mapping[str, float], tests: Mapping[str, float]) -> None:

@@ -95,7 +95,8 @@ class _Workers:
         count = min(session.config.option.side_by_side, len(session.items))
         modules = [item.nodeid.partition("::")[0] for item in session.items]
         self._session = session
-        self._shares = Shares(modules, _seconds(session.config, modules), count)
+        seconds, whole = _seconds(session.config, modules), kept_costs.whole_modules()
+        self._shares = Shares(modules, seconds, count, whole)
         self._links: list[Connection | None] = [None] * count
         self._pids = [0] * count
         self._running: list[int | None] = [None] * count

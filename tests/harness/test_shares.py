@@ -49,6 +49,13 @@ def test_a_worker_without_work_takes_half_of_what_the_busiest_one_has_left() -> 
     assert (shares.next(0), shares.next(1)) == (None, None)
 
 
+def test_a_module_that_is_kept_whole_is_run_by_one_worker() -> None:
+    shares = Shares(list("aaab"), {"a": 9.0, "b": 1.0}, 2, {"a"})
+    assert (shares.next(0), shares.next(1)) == (0, 3)
+    assert shares.next(1) is None
+    assert [shares.next(0), shares.next(0), shares.next(0)] == [1, 2, None]
+
+
 def test_a_test_that_was_not_begun_is_handed_out_again() -> None:
     shares = Shares(["a"] * 3, {}, 1)
     first = shares.next(0)
