@@ -13,7 +13,7 @@ from typing import Any
 import hypothesis
 import pytest
 from _pytest.doctest import DoctestModule
-from harness.kept_costs import dear_tests, whole_modules
+from harness.kept_costs import DEAR_FIXTURE, dear_tests, whole_modules
 from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
@@ -61,16 +61,28 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> Any:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("fast"):
         return
-    dear, whole = dear_tests(), whole_modules()
-    left_out = [
-        item
-        for item in items
-        if item.nodeid in dear or item.nodeid.partition("::")[0] in whole or item.get_closest_marker("long")
-    ]
+    left_out = _left_out(items)
     config.stash[LEFT_OUT] = len(left_out)
     config.hook.pytest_deselected(items=left_out)
     those = set(left_out)
     items[:] = [item for item in items if item not in those]
+
+
+def _left_out(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Return the tests that are dear or long, or have a dear fixture in their module; some of every room stay."""
+    costs, whole = dear_tests(), whole_modules()
+    short = [item for item in items if not item.get_closest_marker("long")]
+    cheap = [item for item in short if item.nodeid not in costs]
+    stay: list[pytest.Item] = []
+    for chosen in (
+        [item for item in cheap if item.nodeid.partition("::")[0] not in whole],
+        cheap,
+        [item for item in short if costs.get(item.nodeid, 0.0) < DEAR_FIXTURE],
+    ):
+        rooms = {item.path.parent for item in stay}
+        stay += [item for item in chosen if item.path.parent not in rooms]
+    those = set(stay)
+    return [item for item in items if item not in those]
 
 
 def _seed(config: pytest.Config) -> int | str:
