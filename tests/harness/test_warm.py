@@ -53,6 +53,7 @@ def test_folder_environment_streams_and_process_group_are_its_own(tmp_path: Path
         assert process.stdin is not None
         process.stdin.write("given")
         process.stdin.close()
+        process.stdin = None
         out, err = process.communicate(timeout=30)
         words = out.split()
         assert words[:2] + words[3:] == [str(tmp_path), "b", str(tmp_path), "True", str(session)]

@@ -133,7 +133,8 @@ def run(
         except BaseException:
             process.kill()
             raise
-    return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, out, err)
+        code = process.wait()
+    return subprocess.CompletedProcess([*map(str, arguments)], code, out, err)
 
 
 class Copy:
@@ -206,7 +207,7 @@ class Copy:
         """Return all that it writes, when it has ended."""
         deadline = None if timeout is None else time.monotonic() + timeout
         streams = [stream for stream in (self.stdout, self.stderr) if stream and not stream.closed]
-        told = {stream: "" for stream in streams}
+        told: dict[IO[str] | None, str] = {None: "", **dict.fromkeys(streams, "")}
 
         def read(stream: IO[str]) -> None:
             told[stream] = stream.read()
