@@ -67,7 +67,7 @@ def git_commit() -> str:
     """Return the commit of the checkout this package runs from, `-dirty` when changed; else `unknown`."""
     here = Path(__file__).resolve()
     # A virtual environment may lie inside a checkout of something else: only our own tracked file counts.
-    # Where the checkout begins at our own root, git need not be asked.
+    # Git need not be asked where the checkout begins at our own root.
     if not (here.parents[2] / ".git").exists() and _git("ls-files", "--error-unmatch", here.name) is None:
         return "unknown"
     return _git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*") or "unknown"

@@ -1,4 +1,4 @@
-"""What each command and each name of `vi` loads: a heavy package only where it computes with it."""
+"""Commands and names of `vi` load a heavy package only where they compute with it."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ WARM = OTHERS | {f"vi.{name}": (NAMES.get(name, ""), 0) for name in dir(vi)} | C
 
 @pytest.fixture(scope="module")
 def loaded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, set[str], str]]:
-    """What every row loads that those of its group before it did not: exit code, modules, end of what it printed."""
+    """Return the modules that each row loads beyond those of its group: exit code, modules, end of what it printed."""
     folder = tmp_path_factory.mktemp("loaded")
     for name, text in (("scene", SCENE), ("swept", SCENE + SWEEP), ("drawn", SCENE + DRAWN)):
         (folder / f"{name}.toml").write_text(text)

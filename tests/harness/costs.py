@@ -46,7 +46,7 @@ def yardstick() -> float:
 
 
 class Costs:
-    """What the tests of this process have cost, and those of its copies when they have ended."""
+    """Costs of the tests of this process, and of its copies when they have ended."""
 
     def __init__(self) -> None:
         self.tests: dict[str, float] = {}

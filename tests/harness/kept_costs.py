@@ -1,4 +1,4 @@
-"""What tests cost in a run with `--keep-costs`: the order of modules, and what `--fast` leaves out, follow from it."""
+"""Costs of tests in a run with `--keep-costs`: the order of modules and the choice of `--fast` follow from them."""
 
 from __future__ import annotations
 
