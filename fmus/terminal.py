@@ -12,34 +12,16 @@ from __future__ import annotations
 
 import os
 import sys
-import unicodedata
 from typing import Any
 
 import typer
 from rich.console import Console
 from rich.text import Text
 
-_KEPT = "\n\t"
+from vibroimpact.fmus.printable import printable
+
 _PIPE_WIDTH = 160
-# Control, format (such as U+202E, which turns what follows around), surrogate, line and paragraph separator.
-_ESCAPED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 _UNWRITTEN: set[str] = set()
-
-
-def printable(text: str) -> str:
-    r"""Return a text in which characters that are no letters, but orders, are shown as their escapes.
-
-    >>> print(printable("a\x1b[31mred\u202eder, 5 \N{MICRO SIGN}s\r"))
-    a\x1b[31mred\u202eder, 5 µs\r
-    """
-    if text.isprintable():
-        return text
-    return "".join(
-        character.encode("unicode_escape").decode("ascii")
-        if unicodedata.category(character) in _ESCAPED and character not in _KEPT
-        else character
-        for character in text
-    )
 
 
 def say(text: object, *, err: bool = False) -> None:

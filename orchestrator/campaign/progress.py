@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, TextIO
 
-from vibroimpact.fmus.terminal import Terminal, printable
+from vibroimpact.fmus.printable import printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
@@ -182,6 +182,8 @@ def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
         return
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import Progress as RichBar
+
+    from vibroimpact.fmus.terminal import Terminal
 
     columns = (
         BarColumn(),

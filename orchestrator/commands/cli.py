@@ -29,7 +29,8 @@ from typer.models import CommandInfo
 
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.file_names import refuse_no_text
-from vibroimpact.fmus.terminal import all_was_written, printable, say
+from vibroimpact.fmus.printable import printable
+from vibroimpact.fmus.terminal import all_was_written, say
 from vibroimpact.fmus.wording import command_line
 
 COMMAND_GROUP = "vibroimpact.commands"

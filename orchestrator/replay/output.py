@@ -16,7 +16,7 @@ import xarray as xr
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.replay_dataset import comparison_dataset
 from vibroimpact.analysis.replay.trust import Verdict
-from vibroimpact.fmus.terminal import printable
+from vibroimpact.fmus.printable import printable
 from vibroimpact.orchestrator.campaign.provenance import provenance
 from vibroimpact.orchestrator.replay.drive import DRIVEN_UNITS
 from vibroimpact.orchestrator.replay.fit import ReplayFit

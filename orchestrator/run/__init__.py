@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.opening import (
     OTHER_ENGINE,
     AnnouncedRunner,
@@ -18,7 +17,6 @@ from vibroimpact.orchestrator.run.session import Session
 __all__ = [
     "OTHER_ENGINE",
     "AnnouncedRunner",
-    "GeneralRunner",
     "PointRunner",
     "Runner",
     "RunnerIdentity",

@@ -9,7 +9,6 @@ from typing import Protocol, runtime_checkable
 
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
-from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
@@ -77,6 +76,9 @@ def open_runner(
         The scene cannot run this way, or a component cannot be loaded.
     """
     if scene.general is not None:
+        # loaded by those who couple components
+        from vibroimpact.orchestrator.run.general import GeneralRunner
+
         return GeneralRunner(scene, execution=execution, log=log, wrap=wrap)
     if scene.replay is not None:
         return named_runner(scene, REPLAY_RUNNER, execution)

@@ -20,7 +20,6 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
-from vibroimpact.orchestrator.run.coupled import CoupledDriver
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.parameters import (
     FMU_NAMES,
@@ -160,6 +159,9 @@ def driver_of(
     if execution in ("fused", "lanes"):
         return BodyDriver(floats, integers, fmu, wrap=wrap)
     if execution == "coupled":
+        # loaded by those who couple
+        from vibroimpact.orchestrator.run.coupled import CoupledDriver
+
         step = scene.execution.macro_step
         return CoupledDriver(
             floats,

@@ -15,7 +15,8 @@ from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.run import GeneralRunner, PointRunner
+from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 DEADLINE = 0.3

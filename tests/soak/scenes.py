@@ -13,7 +13,7 @@ from pathlib import Path
 from support.places import EXAMPLES
 
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
-from vibroimpact.fmus.terminal import printable
+from vibroimpact.fmus.printable import printable
 from vibroimpact.orchestrator.campaign.chunks import Chunk, points_of, run_point
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.result_size import bytes_of_a_run

@@ -15,7 +15,8 @@ from nptdms import ChannelObject, TdmsWriter
 from rich.table import Table
 from support.command_line import in_this_process
 
-from vibroimpact.fmus.terminal import Terminal, printable
+from vibroimpact.fmus.printable import printable
+from vibroimpact.fmus.terminal import Terminal
 
 HOSTILE = "a\x1b[31mb\x1b]0;title\x07\u202ecd\u2066\x9be\x00[bold]f[/bold]"
 SHOWN = r"a\x1b[31mb\x1b]0;title\x07\u202ecd\u2066\x9be\x00[bold]f[/bold]"

@@ -14,7 +14,7 @@ from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneErr
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi import rounding
 from vibroimpact.orchestrator.guard import make_runner
-from vibroimpact.orchestrator.run import GeneralRunner
+from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
 EXAMPLE = EXAMPLES / "bouncing_ball.toml"

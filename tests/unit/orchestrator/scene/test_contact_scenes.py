@@ -12,7 +12,7 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.campaign.manifest import flat_scene
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
-from vibroimpact.orchestrator.run import GeneralRunner
+from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 CONTACT = """\
