@@ -16,6 +16,8 @@ from support.served import Served, scene_file, sweep_text
 
 from vibroimpact.service.client import RemoteJob
 
+pytestmark = pytest.mark.together("service")
+
 SHORT = sweep_text(40, 50, "up")
 LONG = sweep_text(400, 1_000_000)
 MAP = sweep_text(6, 20) + (

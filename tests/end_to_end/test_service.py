@@ -21,6 +21,8 @@ import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.service.client import RemoteJob, Service, ServiceError
 
+pytestmark = pytest.mark.together("service")
+
 LONG = sweep_text(160, 100_000)
 ENDLESS = """
 [scene]

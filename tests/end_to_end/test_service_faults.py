@@ -19,6 +19,8 @@ import vibroimpact as vi
 from vibroimpact.service.client import Service
 from vibroimpact.service.remote import RemoteJob, ServiceError
 
+pytestmark = pytest.mark.together("service")
+
 LONG = sweep_text(120, 100_000)
 
 

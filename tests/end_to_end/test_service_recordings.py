@@ -22,6 +22,8 @@ import vibroimpact as vi
 from vibroimpact.fmus.shipped import fmu_path
 from vibroimpact.service.client import RemoteRecording, ServiceError
 
+pytestmark = pytest.mark.together("service")
+
 COUPLED = (EXAMPLES / "two_oscillators.toml").read_text(encoding="utf-8").replace("70.0", "2.0")
 
 

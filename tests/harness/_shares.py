@@ -1,4 +1,4 @@
-"""Shares of the tests: modules stay together where that costs no time, the dearest begin first."""
+"""Shares of the tests: groups stay together where that costs no time, the dearest begin first."""
 
 from __future__ import annotations
 
@@ -9,37 +9,35 @@ from collections.abc import Collection, Mapping, Sequence
 class Shares:
     """Hands out numbers of tests to workers.
 
-    A worker follows one module to its end, so that fixtures of modules are made once, and then takes the dearest module
+    A worker follows one group to its end, so that what its tests share is made once, and then takes the dearest group
     that nobody has begun. Where none is left it takes the second half of what the busiest worker still has.
 
     Parameters
     ----------
-    modules : sequence of str
-        The module of each test, in the order of collection.
+    groups : sequence of str
+        The group of each test, such as its module, in the order of collection.
     seconds : mapping of str to float
-        Wall time of a module, s, as far as it is known; others count as nothing.
+        Wall time of a group, s, as far as it is known; others count as nothing.
     workers : int
     whole : collection of str
-        Modules that one worker runs alone.
+        Groups that one worker runs alone.
     """
 
     def __init__(
         self,
-        modules: Sequence[str],
+        groups: Sequence[str],
         seconds: Mapping[str, float],
         workers: int,
         whole: Collection[str] = frozenset(),
     ) -> None:
-        groups: dict[str, deque[int]] = {}
-        for number, module in enumerate(modules):
-            groups.setdefault(module, deque()).append(number)
+        numbers: dict[str, deque[int]] = {}
+        for number, name in enumerate(groups):
+            numbers.setdefault(name, deque()).append(number)
         self._each = {
-            number: seconds.get(module, 0.0) / len(group)
-            for module, group in groups.items()
-            for number in group
+            number: seconds.get(name, 0.0) / len(group) for name, group in numbers.items() for number in group
         }
-        self._modules, self._whole = modules, whole
-        self._waiting = deque(sorted(groups.values(), key=self._left, reverse=True))
+        self._groups, self._whole = groups, whole
+        self._waiting = deque(sorted(numbers.values(), key=self._left, reverse=True))
         self._begun: list[deque[int]] = [deque() for _ in range(workers)]
 
     def _left(self, group: deque[int]) -> float:
@@ -55,7 +53,7 @@ class Shares:
         return own.popleft() if own else None
 
     def _take_over(self, own: deque[int]) -> None:
-        shared = [group for group in self._begun if group and self._modules[group[0]] not in self._whole]
+        shared = [group for group in self._begun if group and self._groups[group[0]] not in self._whole]
         busiest = max(shared, key=lambda group: (self._left(group), len(group)), default=own)
         for _ in range((len(busiest) + 1) // 2):
             own.appendleft(busiest.pop())

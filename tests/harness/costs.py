@@ -22,6 +22,8 @@ KEPT = Path(__file__).with_name("budget.toml")
 DEAREST = 20
 MAY_GROW = 0.1
 """Share of the kept figure by which processor time may grow."""
+SHARED = "what tests share: services, clusters, folders"
+"""Named as a test among the dearest: the end of fixtures that a worker's last test did not make."""
 EVERY = 20.0
 """Wall time between two yardsticks of a worker, s."""
 
@@ -32,6 +34,10 @@ def processor_time() -> float:
 
     each = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in each)
+
+
+def _seconds_used() -> float:
+    return processor_time() + warm.seconds_used()
 
 
 def yardstick() -> float:
@@ -50,6 +56,7 @@ class Costs:
 
     def __init__(self) -> None:
         self.tests: dict[str, float] = {}
+        self.shared = self._ends = 0.0
         self.modules: Counter[str] = Counter()
         self.yardsticks = [yardstick()]
         self._measured = time.monotonic()
@@ -57,24 +64,35 @@ class Costs:
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
         """Measure the processor time of a test, its fixtures and the processes that it started and that have ended."""
-        before = processor_time() + warm.seconds_used()
+        before, self._ends = _seconds_used(), 0.0
         try:
             return (yield)
         finally:
-            self.tests[item.nodeid] = processor_time() + warm.seconds_used() - before
+            self.tests[item.nodeid] = _seconds_used() - before - self._ends
             if time.monotonic() - self._measured > EVERY:
                 self.yardsticks.append(yardstick())
                 self._measured = time.monotonic()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_teardown(self, nextitem: pytest.Item | None) -> Any:
+        """Measure what ends with the last test of this worker, but is not of that test alone."""
+        before = _seconds_used()
+        try:
+            return (yield)
+        finally:
+            if nextitem is None:
+                self._ends = self.shared = _seconds_used() - before
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         self.modules[report.nodeid.partition("::")[0]] += report.duration
 
     def pytest_handed_over(self) -> dict[str, Any]:
-        return {"costs": (self.tests, self.yardsticks)}
+        return {"costs": (self.tests, self.shared, self.yardsticks)}
 
     def pytest_taken_over(self, given: dict[str, Any]) -> None:
-        tests, yardsticks = given["costs"]
+        tests, shared, yardsticks = given["costs"]
         self.tests |= tests
+        self.shared += shared
         self.yardsticks += yardsticks
 
 
@@ -128,7 +146,9 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         return
     costs, (seconds, yardsticks) = config.stash[COSTS], config.stash[TOTAL]
     terminalreporter.section(f"processor time: the {DEAREST} dearest tests")
-    for name, took in sorted(costs.tests.items(), key=lambda item: -item[1])[:DEAREST]:
+    for name, took in sorted((costs.tests | {SHARED: costs.shared}).items(), key=lambda item: -item[1])[
+        :DEAREST
+    ]:
         terminalreporter.line(f"{took:7.1f} s  {name}")
     each = statistics.mean(costs.yardsticks)
     terminalreporter.line(

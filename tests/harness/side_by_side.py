@@ -10,7 +10,7 @@ import gc
 import os
 import random
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Mapping
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from typing import Any
@@ -80,12 +80,23 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     warm.end_server()
 
 
-def _seconds(config: pytest.Config, modules: Iterable[str]) -> dict[str, float]:
-    """Return how long each module takes, by which the shares are made; with `--drawn-order` numbers by chance."""
+def _module(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]
+
+
+def _group(item: pytest.Item) -> str:
+    """Return what one worker runs as a whole where it can: a module, or all that is marked `together`."""
+    mark = item.get_closest_marker("together")
+    return _module(item) if mark is None else str(mark.args[0])
+
+
+def _seconds(config: pytest.Config, groups: Mapping[str, Collection[str]]) -> dict[str, float]:
+    """Return how long each group of modules takes; with `--drawn-order` numbers by chance."""
     if config.option.drawn_order is None:
-        return kept_costs.seconds_of_modules()
+        kept = kept_costs.seconds_of_modules()
+        return {name: sum(kept.get(module, 0.0) for module in modules) for name, modules in groups.items()}
     chance = random.Random(config.option.drawn_order)
-    return {module: chance.random() for module in sorted(set(modules))}
+    return {name: chance.random() for name in sorted(groups)}
 
 
 class _Workers:
@@ -93,10 +104,13 @@ class _Workers:
 
     def __init__(self, session: pytest.Session) -> None:
         count = min(session.config.option.side_by_side, len(session.items))
-        modules = [item.nodeid.partition("::")[0] for item in session.items]
         self._session = session
-        seconds, whole = _seconds(session.config, modules), kept_costs.whole_modules()
-        self._shares = Shares(modules, seconds, count, whole)
+        each = [_group(item) for item in session.items]
+        groups: dict[str, set[str]] = {}
+        for name, item in zip(each, session.items, strict=True):
+            groups.setdefault(name, set()).add(_module(item))
+        whole = {name for name, modules in groups.items() if modules & kept_costs.whole_modules()}
+        self._shares = Shares(each, _seconds(session.config, groups), count, whole)
         self._links: list[Connection | None] = [None] * count
         self._pids = [0] * count
         self._running: list[int | None] = [None] * count

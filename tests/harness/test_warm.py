@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,18 @@ def test_folder_environment_streams_and_process_group_are_its_own(tmp_path: Path
         words = out.split()
         assert words[:2] + words[3:] == [str(tmp_path), "b", str(tmp_path), "True", str(session)]
         assert err == "given\n"
+
+
+def test_the_end_of_one_that_ends_at_once_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = warm.Copy._line
+
+    def late(copy: warm.Copy) -> bytes:
+        # process number and end are both there when the first is read
+        time.sleep(0.1)
+        return line(copy)
+
+    monkeypatch.setattr(warm.Copy, "_line", late)
+    assert warm.run("pass").returncode == 0
 
 
 def test_a_signal_reaches_it_alone() -> None:

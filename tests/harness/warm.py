@@ -25,6 +25,7 @@ PROGRAM = "from harness.warm_server import main; main()"
 TESTS = Path(__file__).resolve().parents[1]
 
 DEVNULL = subprocess.DEVNULL
+ENDED = "the warm process for commands has ended"
 WITHOUT_THREADS = {"OPENBLAS_NUM_THREADS": "1", "JE_ARROW_MALLOC_CONF": "background_thread:false"}
 """Variables that keep numpy and pyarrow from starting threads, which a fork loses, when they are imported."""
 
@@ -175,8 +176,16 @@ class Copy:
             data = json.dumps(asked).encode() + b"\n"
             sent = socket.send_fds(self._connection, [data], [given, out, err])
             self._connection.sendall(data[sent:])
-            self._answers = self._connection.makefile()
-            self.pid = int(self._answers.readline())
+            self.pid = int(self._line())
+
+    def _line(self) -> bytes:
+        """Return the next line of the warm process, and take nothing behind it: `wait` looks whether there is more."""
+        line = b""
+        while not line.endswith(b"\n"):
+            byte = self._connection.recv(1)
+            assert byte, ENDED
+            line += byte
+        return line
 
     def poll(self) -> int | None:
         """Return how it has ended; None while it runs."""
@@ -194,10 +203,9 @@ class Copy:
                     ready = self._connection.recv(1, socket.MSG_PEEK)
                 except (TimeoutError, BlockingIOError):
                     raise subprocess.TimeoutExpired(self.args, timeout or 0.0) from None
-                assert ready, "the warm process for commands has ended"
+                assert ready, ENDED
                 self._connection.settimeout(None)
-                told = json.loads(self._answers.readline())
-                self._answers.close()
+                told = json.loads(self._line())
                 self._connection.close()
                 self.returncode = int(told["code"])
                 _seconds += told["seconds"]
