@@ -160,6 +160,7 @@ class Copy:
     ) -> None:
         assert _server is not None
         self.returncode: int | None = None
+        self._waiting = threading.Lock()
         self.args = arguments
         asked = {
             "program": program,
@@ -196,7 +197,7 @@ class Copy:
     def wait(self, timeout: float | None = None) -> int:
         """Wait for its end; return the exit code, or that of the signal with a minus."""
         global _seconds
-        with _lock:
+        with self._waiting:
             if self.returncode is None:
                 self._connection.settimeout(timeout or None if timeout != 0.0 else 0.0)
                 try:
@@ -208,7 +209,8 @@ class Copy:
                 told = json.loads(self._line())
                 self._connection.close()
                 self.returncode = int(told["code"])
-                _seconds += told["seconds"]
+                with _lock:
+                    _seconds += told["seconds"]
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
