@@ -58,6 +58,11 @@ def test_a_portrait_of_a_chain_has_its_masses_and_its_modes_with_a_gap_at_each_i
     ]
     assert [text.get_text() for text in figure.axes[1].get_legend().get_texts()] == ["mode 1", "mode 2"]
     assert gaps(figure, 0, 0) == gaps(figure, 1, 0) == 2
+    names = [(axis.get_xlabel(), axis.get_ylabel()) for axis in figure.axes]
+    assert names == [
+        ("displacement (m)", "velocity (m/s)"),
+        ("modal displacement (√kg m)", "modal velocity (√kg m/s)"),
+    ]
 
 
 def test_the_modes_of_a_portrait_are_mass_normalised() -> None:
