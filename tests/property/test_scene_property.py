@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
+from support.scenes import problems_of
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
@@ -86,12 +87,6 @@ def valid_tables() -> dict[str, dict[str, Any]]:
     }
 
 
-def problems_of(text: str) -> tuple[str, ...]:
-    with pytest.raises(SceneError) as caught:
-        parse_scene(text, "s.toml")
-    return caught.value.problems
-
-
 def found_in(text: str) -> tuple[str, ...]:
     """Return the problems of a text, none for a scene; any other exception is a failure."""
     try:
@@ -146,7 +141,7 @@ def test_any_unknown_key_is_reported_with_its_path(table: str, key: str) -> None
     tables[table] |= {key: 1}
     (problem,) = problems_of(scene_text(tables))
     path = f"stop[1].{key}" if table == "stop" else f"{table}.{key}"
-    assert problem.startswith(f's.toml: {path}: expected a known key, got the unknown key "{key}".')
+    assert problem.startswith(f'{path}: expected a known key, got the unknown key "{key}".')
 
 
 @given(
@@ -159,7 +154,7 @@ def test_nothing_but_a_finite_number_is_a_number(place: tuple[str, str], bad: st
     tables[table] |= {key: "HERE"}
     text = scene_text(tables).replace('"HERE"', bad)
     (problem,) = [line for line in problems_of(text) if f".{key}: " in line]
-    assert problem.startswith(f"s.toml: {'stop[1]' if table == 'stop' else table}.{key}: expected ")
+    assert problem.startswith(f"{'stop[1]' if table == 'stop' else table}.{key}: expected ")
     assert ", got " in problem
 
 
@@ -168,7 +163,7 @@ def test_no_swept_value_is_nan_or_infinite(place: tuple[str, str], bad: float) -
     key = f"{'stop[1]' if place[0] == 'stop' else place[0]}.{place[1]}"
     text = scene_text({**valid_tables(), "sweep": {key: {"values": [0.5, bad]}}})
     (problem,) = problems_of(text)
-    assert problem.startswith(f's.toml: sweep."{key}".values[2]: expected a finite number, got ')
+    assert problem.startswith(f'sweep."{key}".values[2]: expected a finite number, got ')
 
 
 @given(tables=st.dictionaries(st.sampled_from([*MODELS, "sweep", "chain"]), toml_values, max_size=5))

@@ -1,66 +1,10 @@
-"""Scenes of each kind, and single mistakes in them with what is said of each.
+"""Single mistakes in scenes, with what is said of each.
 
 A mistake is a text of the scene, what is written in its place, and the line that is told, of which "..." leaves out the
 end.
 """
 
 from __future__ import annotations
-
-FORCED = """\
-[scene]
-title = "t"
-units = "nondimensional"
-[body]
-mass = 1.0
-stiffness = 1.0
-damping = 0.1
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 1.0
-restitution = 0.7
-[record]
-transient_periods = 10
-recorded_periods = 5
-"""
-CHAIN = """\
-[body]
-kind = "chain"
-masses = [1.0, 2.0, 0.5]
-stiffnesses = [3.0, 1.0, 2.0]
-dampings = 0.1
-[forcing]
-amplitude = [0.5, 0.0, 0.1]
-angular_frequency = 0.9
-[[stop]]
-position = 0.1
-mass = 2
-restitution = 0.7
-[record]
-recorded_periods = 5
-"""
-BEAM = """\
-[body]
-kind = "beam"
-length = 0.25
-width = 0.02
-thickness = 0.002
-youngs_modulus = 70e9
-density = 2700
-modes = 3
-damping_ratio = [0.01, 0.02, 0.03]
-[forcing]
-amplitude = 0.05
-frequency = 25.0
-[[stop]]
-position = 0.001
-location = 0.8
-restitution = 0.6
-[record]
-recorded_periods = 5
-"""
-YIELDING = 'law = "kelvin_voigt"\nstiffness = 1e4\ndamping = 2.0'
 
 OF_AN_OSCILLATOR = [
     ("mass = 1.0", "mass = 0", "body.mass: expected a number > 0, got 0."),

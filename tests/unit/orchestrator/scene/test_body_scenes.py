@@ -4,38 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.scene_mistakes import BEAM, CHAIN, YIELDING
+from support.scenes import BEAM, CHAIN, YIELDING, changed, problems_of, scene_of, swept
 
 from vibroimpact.analysis.dataset import Direction, Outcome, check
 from vibroimpact.fmus.core import beam_modes
-from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign.chunks import carried_attributes, carried_state
 from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
-from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.models import KelvinVoigtStop
-
-
-def scene_of(text: str) -> Scene:
-    return parse_scene(text, "s.toml")
-
-
-def changed(text: str, old: str, new: str) -> str:
-    assert old in text
-    return text.replace(old, new)
-
-
-def problems_of(text: str) -> list[str]:
-    with pytest.raises(SceneError) as caught:
-        scene_of(text)
-    return [problem.removeprefix("s.toml: ") for problem in caught.value.problems]
-
-
-def swept(text: str, *entries: str) -> str:
-    return text + "[sweep]\n" + "\n".join(entries)
-
 
 # What is read.
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from support.component_mistakes import COUPLED
 from support.places import ROOT
+from support.scenes import problems_of
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import SceneError, UsageError
@@ -89,12 +90,6 @@ def ball(tmp_path: Path) -> Callable[[str], Scene]:
 def general_of(scene: Scene) -> GeneralScene:
     assert scene.general is not None
     return scene.general
-
-
-def problems_of(text: str, source: Path = Path("s.toml")) -> list[str]:
-    with pytest.raises(SceneError) as caught:
-        parse_scene(text, str(source))
-    return [problem.removeprefix(f"{source}: ") for problem in caught.value.problems]
 
 
 def coupled(old: str, new: str) -> str:

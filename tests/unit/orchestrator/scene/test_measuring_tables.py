@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from support.scenes import problems_of
 
-from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.sweep import expand
@@ -34,14 +34,8 @@ REPLAY = (
 )
 
 
-def problems_of(text: str) -> list[str]:
-    with pytest.raises(SceneError) as error:
-        parse_scene(text, "chain.toml")
-    return [line.removeprefix("chain.toml: ") for line in str(error.value).splitlines()]
-
-
 def scene(*tables: str) -> Scene:
-    return parse_scene("".join(tables), "chain.toml")
+    return parse_scene("".join(tables), "s.toml")
 
 
 @pytest.mark.parametrize(

@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import pytest
 from support.component_mistakes import COUPLED, OF_COMPONENTS
-from support.scene_mistakes import BEAM, CHAIN, FORCED, OF_A_BEAM, OF_A_CHAIN, OF_AN_OSCILLATOR
-
-from vibroimpact.fmus.errors import SceneError
-from vibroimpact.orchestrator.scene import parse_scene
-
-
-def problem_of(text: str) -> str:
-    """Return the one problem of a scene."""
-    with pytest.raises(SceneError) as caught:
-        parse_scene(text, "s.toml")
-    (problem,) = caught.value.problems
-    assert str(caught.value) == problem
-    return problem.removeprefix("s.toml: ")
-
+from support.scene_mistakes import OF_A_BEAM, OF_A_CHAIN, OF_AN_OSCILLATOR
+from support.scenes import BEAM, CHAIN, FORCED, problem_of
 
 MISTAKES = {FORCED: OF_AN_OSCILLATOR, CHAIN: OF_A_CHAIN, BEAM: OF_A_BEAM, COUPLED: OF_COMPONENTS}
 

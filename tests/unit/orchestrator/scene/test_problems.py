@@ -6,29 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
-from support.scene_mistakes import FORCED
+from support.scenes import FORCED, SOURCE, changed, problems_of, swept
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import load_scene, parse_scene
-
-SOURCE = "s.toml"
-
-
-def problems_of(text: str) -> list[str]:
-    with pytest.raises(SceneError) as caught:
-        parse_scene(text, SOURCE)
-    assert str(caught.value) == "\n".join(caught.value.problems)
-    return [problem.removeprefix("s.toml: ") for problem in caught.value.problems]
-
-
-def forced(old: str, new: str) -> str:
-    assert old in FORCED
-    return FORCED.replace(old, new)
-
-
-def swept(*entries: str) -> str:
-    return FORCED + "[sweep]\n" + "\n".join(entries)
-
 
 # What is said about a single mistake.
 
@@ -38,15 +19,16 @@ def test_corners_of_a_sweep_are_checked_where_the_axes_alone_are_fine() -> None:
         '"body.displacement_start" = { values = [0.0, 0.8] }',
         '"stop[1].position" = { values = [1.0, 0.5] }',
     )
-    assert parse_scene(swept(start), SOURCE)
-    assert parse_scene(swept(position), SOURCE)
-    (problem,) = problems_of(swept(start, position))
+    assert parse_scene(swept(FORCED, start), SOURCE)
+    assert parse_scene(swept(FORCED, position), SOURCE)
+    (problem,) = problems_of(swept(FORCED, start, position))
     assert "displacement <= 0.5), got 0.8 (the worst of the swept values)" in problem
 
 
 def test_a_sweep_carries_its_state_along_one_key_only() -> None:
     (problem,) = problems_of(
         swept(
+            FORCED,
             '"body.mass" = { values = [1], path = "up" }',
             '"body.stiffness" = { values = [1], path = "down" }',
         )
@@ -58,9 +40,11 @@ def test_a_sweep_carries_its_state_along_one_key_only() -> None:
 
 def test_a_sweep_has_at_most_a_hundred_million_points() -> None:
     ten_thousand = "{ start = 1, stop = 2, points = 10_000 }"
-    assert parse_scene(swept(f'"body.mass" = {ten_thousand}', f'"body.stiffness" = {ten_thousand}'), SOURCE)
+    assert parse_scene(
+        swept(FORCED, f'"body.mass" = {ten_thousand}', f'"body.stiffness" = {ten_thousand}'), SOURCE
+    )
     longer = "{ start = 1, stop = 2, points = 10_001 }"
-    (problem,) = problems_of(swept(f'"body.mass" = {ten_thousand}', f'"body.stiffness" = {longer}'))
+    (problem,) = problems_of(swept(FORCED, f'"body.mass" = {ten_thousand}', f'"body.stiffness" = {longer}'))
     assert problem.startswith("sweep: expected at most 100000000 points in all, got 100010000.")
 
 
@@ -105,7 +89,9 @@ def test_a_scene_without_a_body_says_so(text: str) -> None:
 
 
 def test_all_problems_are_reported_at_once() -> None:
-    text = forced("mass = 1.0", "mass = -1").replace("damping = 0.1", "damping = 0.1\ndamping_ratio = 0.1")
+    text = changed(FORCED, "mass = 1.0", "mass = -1").replace(
+        "damping = 0.1", "damping = 0.1\ndamping_ratio = 0.1"
+    )
     text = text.replace("restitution = 0.7", "restitution = 1.2").replace(
         "recorded_periods", "recordd_periods"
     )
@@ -180,9 +166,9 @@ def many(pattern: str, count: int) -> str:
 @pytest.mark.parametrize(
     ("text", "count"),
     [
-        (forced("[forcing]", many("key{} = 1\n", 20_000) + "[forcing]"), 20_000),
+        (changed(FORCED, "[forcing]", many("key{} = 1\n", 20_000) + "[forcing]"), 20_000),
         (FORCED + many("[table{}]\n", 5000), 5000),
-        (swept(*(f'"body.mas{k}" = {{ values = [1] }}' for k in range(3000))), 3000),
+        (swept(FORCED, *(f'"body.mas{k}" = {{ values = [1] }}' for k in range(3000))), 3000),
         (FORCED + "[record.time_series]\nrate = 1\nvariables = [" + many('"v{}", ', 5000) + "]", 5000),
     ],
 )
@@ -194,7 +180,7 @@ def test_of_very_many_problems_some_are_told_and_how_many_more_there_are(text: s
 
 
 def test_a_problem_with_a_key_of_a_million_letters_is_one_short_line() -> None:
-    (problem,) = problems_of(forced("[forcing]", "k" * 10**6 + " = 1\n[forcing]"))
+    (problem,) = problems_of(changed(FORCED, "[forcing]", "k" * 10**6 + " = 1\n[forcing]"))
     assert len(problem) < 500
     assert "kkk..." in problem
 

@@ -9,46 +9,16 @@ from pathlib import Path
 
 import pytest
 from support.places import ROOT
+from support.scenes import FORCED, changed, scene_of, swept
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
+from vibroimpact.orchestrator.scene import load_scene
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MADE_BY_THE_USER = {"bouncing_ball", "user_contact_law"}  # need an FMU that is not shipped
 EXAMPLES = [path for path in sorted((ROOT / "examples").glob("*.toml")) if path.stem not in MADE_BY_THE_USER]
 
-FORCED = """\
-[scene]
-title = "t"
-units = "nondimensional"
-[body]
-mass = 1.0
-stiffness = 1.0
-damping = 0.1
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 1.0
-restitution = 0.7
-[record]
-transient_periods = 10
-recorded_periods = 5
-"""
 FREE = "[body]\nmass = 2\nstiffness = 8\n[record]\nrecorded_time = 5\n"
-
-
-def scene_of(text: str) -> Scene:
-    return parse_scene(text, "s.toml")
-
-
-def forced(old: str, new: str) -> str:
-    assert old in FORCED
-    return FORCED.replace(old, new)
-
-
-def swept(*entries: str) -> str:
-    return FORCED + "[sweep]\n" + "\n".join(entries)
 
 
 # What is read.
@@ -90,7 +60,7 @@ def test_damping_ratio_is_relative_to_critical_damping() -> None:
 
 
 def test_frequency_in_hertz_is_two_pi_times_smaller_than_angular_frequency() -> None:
-    text = forced("angular_frequency = 0.8", "frequency = 5.0").replace("nondimensional", "SI")
+    text = changed(FORCED, "angular_frequency = 0.8", "frequency = 5.0").replace("nondimensional", "SI")
     scene = scene_of(text)
     assert scene.forcing is not None
     assert scene.forcing.angular_frequency == 2 * math.pi * 5.0
@@ -109,12 +79,15 @@ def test_variables_of_a_period_are_not_recorded_where_there_is_none() -> None:
 
 
 def test_a_start_exactly_on_the_stop_is_allowed() -> None:
-    assert scene_of(forced("damping = 0.1", "displacement_start = 1.0")).body.displacement_start == 1.0
+    assert (
+        scene_of(changed(FORCED, "damping = 0.1", "displacement_start = 1.0")).body.displacement_start == 1.0
+    )
 
 
 def test_continuation_values_ascend_and_independent_values_keep_their_order() -> None:
     scene = scene_of(
         swept(
+            FORCED,
             '"forcing.angular_frequency" = { start = 1.6, stop = 0.6, points = 3, path = "up" }',
             '"body.mass" = { values = [3, 1, 2] }',
         )
@@ -126,7 +99,7 @@ def test_continuation_values_ascend_and_independent_values_keep_their_order() ->
 
 
 def test_a_swept_key_may_be_left_out_of_its_table() -> None:
-    text = swept('"body.damping_ratio" = { values = [0.05, 0.1] }').replace("damping = 0.1\n", "")
+    text = swept(FORCED, '"body.damping_ratio" = { values = [0.05, 0.1] }').replace("damping = 0.1\n", "")
     assert scene_of(text).body.damping_ratio == 0.05
 
 
@@ -153,7 +126,7 @@ def test_at_a_point_changes_only_what_it_is_given() -> None:
 
 
 def test_damping_follows_its_ratio_when_the_stiffness_is_swept() -> None:
-    scene = scene_of(forced("damping = 0.1", "damping_ratio = 0.05"))
+    scene = scene_of(changed(FORCED, "damping = 0.1", "damping_ratio = 0.05"))
     assert scene.at({"body.stiffness": 4.0}).body.damping == 2 * 0.05 * 2.0
 
 
@@ -202,6 +175,7 @@ def test_a_scene_travels_to_workers_and_cannot_be_changed() -> None:
 
 def test_coordinates_are_named_by_the_last_part_of_their_key_unless_two_clash() -> None:
     text = swept(
+        FORCED,
         '"stop[1].position" = { values = [1.0] }',
         '"stop[2].position" = { values = [-1.0] }',
         '"body.mass" = { values = [1.0] }',
