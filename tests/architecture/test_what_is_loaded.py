@@ -216,9 +216,9 @@ def test_a_command_or_name_loads_no_heavy_package_that_it_does_not_use(
 
 
 def test_a_package_that_is_used_is_seen_to_be_loaded(loaded: dict[str, tuple[int, set[str], str]]) -> None:
-    assert "scipy" in loaded["run drawn.toml -o drawn.nc"][1]
     assert "matplotlib" in loaded["plot swept.nc -o swept.png"][1]
     assert "numpy" in loaded["fmu list"][1]
+    assert "grpc" in loaded["rig devices --rig virtual:oscillator.toml"][1]
 
 
 def test_every_command_has_a_row() -> None:

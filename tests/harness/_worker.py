@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import io
 import os
 import sys
 import traceback
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
+from _pytest._io import TerminalWriter
 
 
 class _Told:
@@ -50,6 +52,13 @@ class _Told:
         self._link.send(("warning", given))
 
 
+class _NoTerminal:
+    """What pytest asks how to colour its explanations, where nothing is shown."""
+
+    def __init__(self) -> None:
+        self._tw = TerminalWriter(io.StringIO())
+
+
 def run_share(session: pytest.Session, link: Connection, folder: Path) -> NoReturn:
     """Run tests until no number of one comes; then end this process, and nothing that its parent has begun."""
     code = 1
@@ -77,6 +86,7 @@ def _become_a_worker(config: pytest.Config, link: Connection, folder: Path) -> N
     gc.enable()
     plugins: Any = config.pluginmanager
     plugins.unregister(name="terminalreporter")
+    plugins.register(_NoTerminal(), "terminalreporter")
     told = _Told(config, link)
     plugins.register(told)
     told.listens = True
