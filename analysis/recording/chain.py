@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.recording.channels import Quality
 
 Floats = NDArray[np.float64]
-NUMBERS = ("sensor_range", "noise_rms", "range", "bits", "clock_error_ppm", "skew")
+NUMBERS = ("sensor_range", "sensitivity", "noise_rms", "range", "bits", "clock_error_ppm", "skew")
 """Attributes of a channel that are numbers, or the name of the coordinate that has one for each run."""
 _DEVIATIONS = 4.0
 """Noise that hides the end of a sensor's range, in its standard deviations."""

@@ -34,6 +34,8 @@ class Excursions:
         First upward and last downward crossing of the threshold, s, linear between samples.
     peak : ndarray of float, shape (excursion,)
         Largest value of the statistic.
+    samples : ndarray of int, shape (excursion,)
+        Samples above the threshold.
     """
 
     first: Indices
@@ -41,6 +43,7 @@ class Excursions:
     up: Floats
     down: Floats
     peak: Floats
+    samples: Indices
 
     def __len__(self) -> int:
         """Return the number of excursions."""
@@ -56,10 +59,8 @@ class Group:
     last: int
 
 
-def find_excursions(
-    time: Floats, statistic: Floats, threshold: float, hysteresis: float, minimum_samples: int
-) -> tuple[Excursions, int]:
-    """Return the excursions past a threshold, and how many were too short.
+def find_excursions(time: Floats, statistic: Floats, threshold: float, hysteresis: float) -> Excursions:
+    """Return the excursions past a threshold.
 
     An excursion begins where the statistic rises past `threshold` and is over only where it has fallen below
     `hysteresis * threshold`, so that noise on its flank does not split it. A change of sign ends it too.
@@ -74,8 +75,6 @@ def find_excursions(
         In units of the statistic.
     hysteresis : float
         Lower threshold as a part of the threshold, 0 to 1.
-    minimum_samples : int
-        Fewer samples above the threshold are no excursion (thesis section 5.3: four).
     """
     magnitude = np.abs(statistic)
     low = (magnitude > hysteresis * threshold) * np.where(statistic < 0.0, -1, 1)
@@ -84,14 +83,13 @@ def find_excursions(
     stops = np.concatenate((edges, [len(low)])).astype(np.intp)
     above = np.concatenate(([0], np.cumsum(magnitude > threshold)))
     samples = np.where(low[starts] != 0, above[stops] - above[starts], 0)
-    chosen = samples >= minimum_samples
-    starts, stops = starts[chosen], stops[chosen]
-    short = int(np.count_nonzero((samples > 0) & ~chosen))
+    chosen = samples > 0
+    starts, stops, samples = starts[chosen], stops[chosen], samples[chosen]
     rows = [
         _crossings(time, magnitude, int(a), int(b), threshold) for a, b in zip(starts, stops, strict=True)
     ]
     up, down, peak = np.array(rows, dtype=np.float64).reshape(-1, 3).T
-    return Excursions(starts, stops - 1, up, down, peak), short
+    return Excursions(starts, stops - 1, up, down, peak, samples)
 
 
 def _crossings(
@@ -123,10 +121,13 @@ def crossing(time: Floats, values: Floats, before: int, after: int, level: float
     return float(time[before] + part * (time[after] - time[before]))
 
 
-def group_excursions(found: Excursions, time: Floats, merge: float | None) -> list[Group]:
-    """Group each spike with its ringing.
+def group_excursions(
+    found: Excursions, time: Floats, merge: float | None, minimum_samples: int
+) -> tuple[list[Group], int]:
+    """Return each spike with its ringing, and how many excursions have too few samples to be one.
 
-    An excursion joins the group before it if it begins within `merge` of the end of the last one in it.
+    An excursion joins the group before it if it begins within `merge` of the end of the last one in it. A group
+    with fewer than `minimum_samples` above the threshold, over all its half cycles, is no spike (thesis 5.3: four).
 
     Parameters
     ----------
@@ -146,7 +147,9 @@ def group_excursions(found: Excursions, time: Floats, merge: float | None) -> li
             continue
         main = place if found.peak[place] > found.peak[group.main] else group.main
         groups[-1] = Group(group.first, main, place)
-    return groups
+    samples = np.concatenate(([0], np.cumsum(found.samples)))
+    long = [one for one in groups if samples[one.last + 1] - samples[one.first] >= minimum_samples]
+    return long, len(found) - sum(one.last - one.first + 1 for one in long)
 
 
 def _reach(found: Excursions, time: Floats, group: Group, place: int, merge: float | None) -> float:

@@ -12,10 +12,24 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, Quality
 from vibroimpact.analysis.recording.units import measured_unit
+from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.analysis.spikes.baseline import drift_window, running_median
+from vibroimpact.analysis.spikes.converter import (
+    LEAST_STEPS,
+    between_steps,
+    converter_doubts,
+    converter_step,
+)
 from vibroimpact.analysis.spikes.cycle import PeriodicPart, cycle_scores, find_cycle
 from vibroimpact.analysis.spikes.detection import Excursions, Group, find_excursions, group_excursions
-from vibroimpact.analysis.spikes.noise import Tail, samples_in_half_wave, tail_threshold
+from vibroimpact.analysis.spikes.noise import (
+    HALF_WAVE_OF_MOTION,
+    STANDS_OUT,
+    Tail,
+    outside_excursions,
+    samples_in_half_wave,
+    tail_threshold,
+)
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.wording import option
 
@@ -32,8 +46,9 @@ _SMALLEST_PART = 1e-3
 #: Longest spike assumed in the first look at the drift, as one over its share of the record.
 _FIRST_LOOK = 2000
 _FEWEST_SAMPLES = 16
-#: Mean samples between two changes of sign above which a signal is a motion and no noise.
-_HALF_WAVE_OF_MOTION = 12.0
+#: Height, relative to the noise, at which a person sees a spike, and how many samples of none may be as high: few, or
+#: so many times what normal noise has there.
+_SEEN_BY_EYE, _FEW, _MANY_TIMES = 4.5, 3, 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +163,8 @@ class Identification:
     interval : float
         Sampling interval, s; the mean one, pauses left out.
     remarks : list of str
+    doubts : list of str
+        What makes it unsure that these are the spikes, and all of them.
     """
 
     time: Floats
@@ -173,6 +190,12 @@ class Identification:
     settings: SpikeSettings
     interval: float
     remarks: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the spikes found are to be relied on, in one line, and why not."""
+        return f"not sure, because {'; '.join(self.doubts)}." if self.doubts else "sure."
 
 
 def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identification:
@@ -194,7 +217,9 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
     cycle, method, reason = _method(channel, signal, chosen)
     periodic = cycle.periodic if method != "threshold" else np.zeros(len(signal))
     interval = channel.axis.pace
-    baseline, window = _baseline(signal - periodic, bad, chosen, interval)
+    step = converter_step(signal[~bad])
+    between = between_steps(len(signal), step) if step else np.zeros(len(signal))
+    baseline, window = _baseline(signal - periodic + between, bad, chosen, interval)
     residual = signal - periodic - baseline
     polarity = POLARITIES[chosen.polarity]
     statistic = residual
@@ -203,13 +228,15 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
         width = max(2, width or round(cycle.period / _RMS_WINDOWS_IN_CYCLE))
         statistic, polarity = cycle_scores(residual, cycle.period, width), 1
     start = np.arange(len(time)) < (_CYCLES_TO_SETTLE * cycle.period if method != "threshold" else 0.0)
-    tail, noise = _noise(statistic, residual, bad | start, chosen, polarity, method)
-    threshold = _threshold(statistic, tail, chosen, polarity)
+    looked_into = statistic + between if method != "cycle_median" else statistic
+    tail, noise = _noise(looked_into, residual + between, bad | start, chosen, polarity, method)
+    least = LEAST_STEPS * step if method != "cycle_median" else 0.0
+    threshold = _threshold(statistic, tail, chosen, polarity, least)
     looked_at = statistic if polarity == 0 else np.where(polarity * statistic > 0.0, statistic, 0.0)
-    excursions, short = find_excursions(time, looked_at, threshold, chosen.hysteresis, chosen.minimum_samples)
+    excursions = find_excursions(time, looked_at, threshold, chosen.hysteresis)
     settling = _CYCLES_TO_SETTLE * cycle.period * interval
     merge = settling if method == "cycle_median" and chosen.merge is None else chosen.merge
-    groups = group_excursions(excursions, time, merge)
+    groups, short = group_excursions(excursions, time, merge, chosen.minimum_samples)
     settled = float(time[0])
     if method != "threshold":
         groups, settled = _after_start(groups, excursions, time, settling)
@@ -236,8 +263,10 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
         window,
         chosen,
         interval,
-        _remarks(channel, bad)
+        _remarks(channel, bad, step if noise < step else 0.0)
         + (_unrest(residual[~bad], interval) if method == "threshold" and noise else []),
+        _doubts(channel, signal[~bad])
+        + (_missed(time, looked_at, noise, threshold, chosen) if method != "cycle_median" else []),
     )
 
 
@@ -292,13 +321,13 @@ def _baseline(
         return running_median(values, window, ~bad), window
     # the first look shows where the spikes are
     first = running_median(values, drift_window(values, length // _FIRST_LOOK, ~bad), ~bad)
-    level = tail_threshold((values - first)[~bad], settings.false_alarms).threshold
-    places = np.arange(length, dtype=np.float64)
-    found, _ = find_excursions(places, values - first, level, settings.hysteresis, settings.minimum_samples)
-    used = ~bad
-    for group in group_excursions(found, places, None):
-        used[found.first[group.first] : found.last[group.last] + 1] = False
-    longest = int(np.max(found.last - found.first + 1, initial=1))
+    rest, used = values - first, ~bad
+    used[used] = outside_excursions(rest[used])
+    found = find_excursions(
+        np.arange(length, dtype=np.float64), rest, STANDS_OUT * robust_sigma(rest[used]), settings.hysteresis
+    )
+    long = found.samples >= settings.minimum_samples
+    longest = int(np.max((found.last - found.first + 1)[long], initial=1))
     if np.count_nonzero(used) < length // 4:
         used = ~bad
     window = drift_window(values, longest, used)
@@ -326,14 +355,14 @@ def _noise(
     return tail, tail.sigma if method != "cycle_median" else tail_threshold(residual[~bad], 0.01).sigma
 
 
-def _threshold(statistic: Floats, tail: Tail, settings: SpikeSettings, polarity: int) -> float:
-    """Return the threshold asked for, or that of the noise."""
+def _threshold(statistic: Floats, tail: Tail, settings: SpikeSettings, polarity: int, least: float) -> float:
+    """Return the threshold asked for, or that of the noise and `least`."""
     largest = float(np.max(np.abs(statistic) if polarity == 0 else polarity * statistic, initial=0.0))
     if settings.threshold is not None:
         return settings.threshold
     if settings.threshold_part is not None:
         return settings.threshold_part * largest
-    return max(tail.threshold, _SMALLEST_PART * largest, float(np.finfo(float).tiny))
+    return max(tail.threshold, least, _SMALLEST_PART * largest, float(np.finfo(float).tiny))
 
 
 def _after_start(
@@ -353,7 +382,7 @@ def _after_start(
 def _unrest(residual: Floats, interval: float) -> list[str]:
     """Say so where the signal between the spikes is a motion, of which the threshold then speaks."""
     samples = samples_in_half_wave(residual)
-    if samples < _HALF_WAVE_OF_MOTION:
+    if samples < HALF_WAVE_OF_MOTION:
         return []
     return [
         f"Between its spikes the signal is no noise but a motion at about {0.5 / (samples * interval):.3g} Hz: "
@@ -362,8 +391,39 @@ def _unrest(residual: Floats, interval: float) -> list[str]:
     ]
 
 
-def _remarks(channel: Channel, bad: NDArray[np.bool_]) -> list[str]:
+def _doubts(channel: Channel, values: Floats) -> list[str]:
+    """Return what in the samples shows that the signal is not what they say."""
+    return converter_doubts(values, bool(np.any(channel.quality & np.uint8(Quality.clipped))))
+
+
+def _missed(
+    time: Floats, statistic: Floats, noise: float, threshold: float, settings: SpikeSettings
+) -> list[str]:
+    """Return a doubt where more of the signal stands out of the noise than normal noise does, and is no spike."""
+    from scipy.special import ndtr
+
+    level = _SEEN_BY_EYE * noise
+    if not 0.0 < level < threshold:
+        return []
+    high = find_excursions(time, statistic, level, settings.hysteresis)
+    groups, _ = group_excursions(high, time, settings.merge, 1)
+    low = [one for one in groups if high.peak[one.main] <= threshold]
+    samples = sum(int(high.samples[one.first : one.last + 1].sum()) for one in low)
+    if samples <= max(_FEW, _MANY_TIMES * 2.0 * float(ndtr(-_SEEN_BY_EYE)) * len(statistic)):
+        return []
+    return [
+        f"{samples} samples lie beyond {_SEEN_BY_EYE:g} times the noise and below the threshold, "
+        f"{threshold / noise:.3g} times the noise: spikes as weak, or noise with a heavy tail"
+    ]
+
+
+def _remarks(channel: Channel, bad: NDArray[np.bool_], step: float) -> list[str]:
     remarks = []
+    if step:
+        remarks.append(
+            f"The values lie on a grid of {step:.4g}, the step of a converter: the noise is taken to be at least "
+            f"that of the steps, and the threshold {LEAST_STEPS:g} steps."
+        )
     count = int(np.count_nonzero(bad))
     if count:
         remarks.append(f"{count} samples have no value; straight lines bridge them.")

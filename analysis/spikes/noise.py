@@ -46,6 +46,19 @@ _RINGS = 3.0
 #: once in 1e10 stretches.
 _HALF_WAVES = 20
 _RINGS_SHORTLY = 6.0
+#: Magnitude, relative to the noise, of samples that stand out, and how many as near make an excursion that is no noise.
+STANDS_OUT = 4.0
+_AS_A_SPIKE = 4
+_HALF_CYCLE = 8
+#: Mean samples between two changes of sign above which a signal is a motion and no noise; its peaks are no spikes.
+HALF_WAVE_OF_MOTION = 12.0
+#: RMS over so many samples, relative to the noise, down to which an excursion is not over.
+_LOUD, _LOUD_SAMPLES = 1.5, 16
+_MOST_LOOKS = 20
+#: Share of the samples below which a record has no rest to take its noise from.
+_LEAST_OUTSIDE = 0.5
+#: Largest threshold relative to the largest peak of the noise: a hundred times rarer, with Student's t of 3 degrees.
+_MOST_BEYOND = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +109,15 @@ def _peaks_of_one_sign(values: Floats) -> Floats:
 
 def samples_in_half_wave(values: Floats) -> float:
     """Return the mean length, in samples, of the stretches of one sign where a signal is quiet."""
-    rest = values[quiet(values)]
+    rest = values[at_rest(values)]
     return len(rest) / max(1, half_wave_peaks(rest).size)
+
+
+def at_rest(values: Floats) -> NDArray[np.bool_]:
+    """Return which samples lie outside excursions, and in stretches that do not ring."""
+    rest = outside_excursions(values)
+    rest[rest] = quiet(values[rest])
+    return rest
 
 
 def quiet(values: Floats) -> NDArray[np.bool_]:
@@ -129,6 +149,51 @@ def _still(values: Floats, stretch: int, ratio: float) -> NDArray[np.bool_]:
     return np.asarray(still[place])
 
 
+def outside_excursions(values: Floats) -> NDArray[np.bool_]:
+    """Return which samples are noise, and no part of an excursion that is as long as a spike.
+
+    Excursions of fewer samples are left: they are the tail of the noise.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+        The signal without its baseline.
+    """
+    outside = np.ones(len(values), dtype=bool)
+    for _ in range(_MOST_LOOKS):
+        sigma = robust_sigma(values[outside])
+        found = ~_long_excursions(values, sigma) if sigma > 0.0 else outside
+        if np.count_nonzero(found) < _LEAST_OUTSIDE * len(values):
+            # a signal that is never at rest
+            return np.ones(len(values), dtype=bool)
+        if np.array_equal(found, outside):
+            break
+        outside = found
+    return outside
+
+
+def _long_excursions(values: Floats, sigma: float) -> NDArray[np.bool_]:
+    """Return which samples lie in excursions as long as a spike, or beside one where the signal is still loud."""
+    high = np.flatnonzero(np.abs(values) > STANDS_OUT * sigma)
+    found = np.zeros(len(values), dtype=bool)
+    half_wave = len(values) / max(1, half_wave_peaks(values).size)
+    fewest = half_wave if half_wave > HALF_WAVE_OF_MOTION else _AS_A_SPIKE
+    if high.size < fewest:
+        return found
+    # half cycles of ringing are one excursion
+    for part in np.split(high, np.flatnonzero(np.diff(high) > _HALF_CYCLE) + 1):
+        if part.size >= fewest:
+            beside = int(part[-1] - part[0]) + 1
+            found[max(0, part[0] - beside) : part[-1] + 1 + beside] = True
+    power = np.convolve(values**2, np.full(_LOUD_SAMPLES, 1.0 / _LOUD_SAMPLES), "same")
+    loud = found | (power > (_LOUD * sigma) ** 2)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], loud, [False])).astype(np.int8)))
+    for first, stop in zip(edges[::2], edges[1::2], strict=True):
+        if np.any(found[first:stop]):
+            found[first:stop] = True
+    return found
+
+
 def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Tail:
     """Return the threshold that noise passes `false_alarms` times a record, from the record itself.
 
@@ -143,7 +208,7 @@ def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Ta
     """
     from scipy.special import ndtri
 
-    values = values[quiet(values)]
+    values = values[at_rest(values)]
     sigma = robust_sigma(values)
     if sigma == 0.0:
         # a signal that is constant but for its spikes has no noise
@@ -152,12 +217,14 @@ def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Ta
     peaks = half_wave_peaks(signed) if not polarity else _peaks_of_one_sign(signed)
     part = float(np.clip(1.0 - _PEAKS_WANTED / max(peaks.size, 1), 0.5, _TAIL_QUANTILE))
     level = float(np.quantile(peaks, part)) if peaks.size else 0.0
-    excesses = np.sort(peaks[peaks > level] - level)
+    # of normal noise the squares fall exponentially: their shape is 0
+    excesses = np.sort(peaks[peaks > level] ** 2 - level**2)
     if excesses.size < _FEWEST_PEAKS:
         normal = -float(ndtri(min(0.5, false_alarms / (2.0 * max(1, len(values))))))
         return Tail(sigma, 0.0, sigma * normal)
     shape, height = _grown_fit(excesses, false_alarms)
-    return Tail(sigma, shape, level + height)
+    threshold = float(np.sqrt(level**2 + height))
+    return Tail(sigma, shape / 2.0, min(threshold, _MOST_BEYOND * float(peaks.max())))
 
 
 def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float]:

@@ -26,7 +26,9 @@ def print_spikes(console: Terminal, report: SpikeReport) -> None:
     """
     data = report.dataset
     count = int(data.sizes["spike"])
-    console.print(f"{data.attrs['channel']}: {count or 'no'} {'spike' if count == 1 else 'spikes'}.")
+    console.print(
+        f"{data.attrs['channel']}: {count or 'no'} {'spike' if count == 1 else 'spikes'}; {report.found.verdict}"
+    )
     for line in _words(report):
         console.print(line, style="yellow")
     console.print(_settings(report))

@@ -34,7 +34,7 @@ class Mechanics:
         Effective mass of the contact, kg.
     restitution : float or None
     sensitivity : float or None
-        Of the load cell, V/N.
+        Of the load cell, V/N; that of its scene, for a simulated one.
     known_impulses : ndarray of float or None
         N s, one for each spike: the sensitivity is fitted.
     foot : float
@@ -84,6 +84,12 @@ def spike_report(
     """
     channel, known = channel_of(channel), mechanics or Mechanics()
     calibration = None
+    if (
+        known.sensitivity is None
+        and known.known_impulses is None
+        and channel.attrs.get("role") == "simulated"
+    ):
+        known = replace(known, sensitivity=channel.attrs.get("sensitivity"))
     if known.known_impulses is not None:
         _expect_volts(channel, "known impulses")
         pulses = measure_pulses(identify(channel, settings), known.foot, known.waveform)
@@ -275,6 +281,7 @@ def _attributes(
         "restitution": known.restitution,
         "sensitivity": known.sensitivity,
         "interval_uncertainty": channel.axis.interval_uncertainty,
+        "verdict": found.verdict,
         "remarks": "\n".join(found.remarks),
     }
     return {name: value for name, value in attributes.items() if value is not None}

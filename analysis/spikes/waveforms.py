@@ -184,7 +184,9 @@ def _step(waveform: Waveform, place: Floats, values: Floats, state: Floats) -> F
     value, slope = waveform.value(time), waveform.slope(time)
     gradient = np.stack([value, -peak * slope / length, -peak * slope * time / length], axis=2)
     normal = np.einsum("spi,spj->sij", gradient, gradient)
-    normal += 1e-9 * np.eye(3) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
+    size = np.trace(normal, axis1=1, axis2=2)
+    # a curve that has left its pulse has no gradient, and takes no step
+    normal += 1e-9 * np.eye(3) * np.where(size > 0.0, size, 1.0)[:, None, None]
     right = np.einsum("spi,sp->si", gradient, values - peak * value)
     step: Floats = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
     return step

@@ -264,7 +264,7 @@ def _pulses(volts: Floats, cell: InputTable, rate: float) -> Floats:
     """Return at which samples the pulses of a load cell begin; what follows within the dead time is ringing."""
     assert cell.threshold is not None  # the file was checked
     centred = np.nan_to_num(volts - np.nanmedian(volts)) if np.isfinite(volts).any() else np.zeros(len(volts))
-    found, _ = find_excursions(np.arange(len(volts), dtype=np.float64), centred, cell.threshold, _ENDED, 1)
+    found = find_excursions(np.arange(len(volts), dtype=np.float64), centred, cell.threshold, _ENDED)
     begins: list[float] = []
     for up in found.up:
         if not begins or up - begins[-1] > cell.dead_time * rate:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Direction, RunRecord
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import coordinate_name
-from vibroimpact.orchestrator.scene.measuring_models import channel_number
+from vibroimpact.orchestrator.scene.measuring_models import LOAD_CELL, channel_number
 
 Floats = NDArray[np.float64]
 
@@ -109,6 +109,8 @@ def channel_attributes(scene: Scene) -> dict[str, dict[str, Any]]:
         own: dict[str, Any] = {"channel": name}
         if name.startswith("sensor.") and scene.sensor is not None and scene.sensor.range:
             own["sensor_range"] = told("sensor.range")
+        if name == LOAD_CELL:
+            own["sensitivity"] = told("load_cell.sensitivity")
         if scene.noise is not None:
             own |= {
                 "noise_rms": told(f"noise.{name.partition('.')[0]}"),

@@ -112,7 +112,7 @@ def test_the_command_prints_writes_and_draws_what_the_spikes_are(record: Path, t
         "--polarity",
         "positive",
     )
-    assert "cell: 40 spikes." in told
+    assert "cell: 40 spikes; sure." in told
     assert "half-sine" in told
     assert "rigid impacts are an adequate model" in told
     assert figure.read_bytes().startswith(b"\x89PNG")

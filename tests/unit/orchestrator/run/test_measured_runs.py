@@ -13,6 +13,7 @@ from support.tolerance import PARTITION
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, open_dataset
 from vibroimpact.analysis.recording import Quality, open_signals
+from vibroimpact.analysis.spikes import Mechanics, spike_report
 from vibroimpact.orchestrator.campaign import run_campaign, run_scene
 from vibroimpact.orchestrator.run import PointRunner, Session
 from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
@@ -277,6 +278,17 @@ def test_signals_are_read_as_those_of_a_recording(tmp_path: Path) -> None:
     assert (sensor.quality == Quality.clipped).sum() > 10
     np.testing.assert_allclose(cell.axis.time - sensor.axis.time, 1e-5, rtol=1e-6)
     assert not signals.channels["displacement"].quality.any()
+
+
+def test_spikes_of_a_simulated_cell_are_forces_by_the_sensitivity_of_its_scene(tmp_path: Path) -> None:
+    swept = '[sweep]\n"load_cell.sensitivity" = { values = [0.004, 0.008] }\n'
+    run_scene(scene(SENSOR, CELL, DAQ, swept, variables=("load_cell",)), tmp_path / "run.nc")
+    for run, sensitivity in enumerate((0.004, 0.008)):
+        cell = open_signals(tmp_path / "run.nc", run).channels["load_cell"]
+        found, asked = spike_report(cell), spike_report(cell, mechanics=Mechanics(sensitivity=sensitivity))
+        assert found.dataset.spike_peak.attrs["units"] == "N"
+        assert found.dataset.sizes["spike"] > 0
+        assert found.dataset.identical(asked.dataset)
 
 
 def test_swept_ranges_flag_each_run_by_its_own(tmp_path: Path) -> None:

@@ -1,0 +1,116 @@
+"""What the converter of a record leaves of a signal: steps, ends of its range, nothing.
+
+Between two steps a converter says nothing: noise of less than a step comes out as a few samples of one step more, far
+above the median magnitude, which is 0. A random part of a step, added before the noise is looked at, makes up for it
+(Widrow and Kollar 2008, section 19): what is found then is the noise and that of the steps, step / sqrt(12), together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.robust import robust_sigma
+
+Floats = NDArray[np.float64]
+
+LEAST_STEPS = 1.5
+"""Lowest threshold in steps: the next value is noise."""
+#: Rounding of values, relative to the largest: they may have been kept as float32, or printed with seven digits.
+_ROUNDING = 4.0 * float(np.finfo(np.float32).eps)
+#: Shortest step in units of that rounding, and how far values may be from the grid, in steps.
+_CLEAR, _OFF_GRID = 20.0, 0.1
+#: Noise, in steps, from which on no estimate of it feels the steps.
+_FINE = 10.0
+#: Most distinct values of a converter: 24 bits are never all met in a record.
+_MOST_VALUES = 1 << 18
+#: Samples that lie one after the other at the end of the range, and how far in steps that is from the middle.
+_FLAT, _FAR = 3, 10.0
+#: Samples from there to those that tell a jump from a smooth peak, and the noise granted, in its standard deviations.
+_BESIDE, _DEVIATIONS = 2, 3.0
+
+
+def converter_step(values: Floats) -> float:
+    """Return the step of the grid on which all values lie; 0 where there is none, or where noise hides it.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+        As they were converted, calibrated or not.
+
+    Examples
+    --------
+    >>> counts = np.array([3, 4, 4, 3, 5, 4, 9, 4])
+    >>> round(converter_step(0.25 * counts + 0.1), 12)
+    0.25
+    >>> converter_step(np.random.default_rng(0).normal(size=100))
+    0.0
+    """
+    distinct = np.unique(values)
+    if not 1 < distinct.size <= min(_MOST_VALUES, max(3, len(values) // 2)):
+        return 0.0
+    rounding = _ROUNDING * float(np.max(np.abs(distinct)))
+    distinct = distinct[np.concatenate(([True], np.diff(distinct) > rounding))]
+    gaps = np.diff(distinct)
+    if not gaps.size or gaps.min() < _CLEAR * rounding:
+        return 0.0
+    counts = np.round(gaps / gaps.min())
+    step = float(gaps.sum() / counts.sum())
+    places = (distinct - distinct[0]) / step
+    if np.max(np.abs(places - np.round(places))) > _OFF_GRID:
+        return 0.0
+    return step if _noise_between(values) < _FINE * step else 0.0
+
+
+def between_steps(length: int, step: float) -> Floats:
+    """Return random parts of a step, one for each sample, the same each time."""
+    return step * (np.random.default_rng(0).random(length) - 0.5)
+
+
+def converter_doubts(values: Floats, known_clipped: bool) -> list[str]:
+    """Return what in a record shows that the converter, and not the signal, made it.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+    known_clipped : bool
+        Whether clipped samples are marked already.
+    """
+    if np.ptp(values) == 0.0:
+        return [f"all {values.size} samples are {values[0]:.6g}: the channel is dead"]
+    step = converter_step(values)
+    if not step or known_clipped:
+        return []
+    middle, doubts = float(np.median(values)), []
+    noise = _noise_between(values) / step
+    for words, side in (("largest", 1.0), ("smallest", -1.0)):
+        end = side * float(np.max(side * values))
+        samples = _held(side * (values - end) / step, noise)
+        if samples and abs(end - middle) > _FAR * step:
+            doubts.append(
+                f"{samples} samples lie one after the other at the {words} value, {end:.6g}: the range of the "
+                "converter seems to end there, and peaks and impulses are lower bounds"
+            )
+    return doubts
+
+
+def _noise_between(values: Floats) -> float:
+    """Return the noise from one sample to the next, which a motion does not feel."""
+    return robust_sigma(np.diff(values)) / float(np.sqrt(2.0))
+
+
+def _held(below: Floats, noise: float) -> int:
+    """Return the samples that are held at 0, the largest value, where they were reached and left at a jump.
+
+    A smooth peak is left as a parabola that was within half a step of its top, and by the noise. Both are in steps.
+    """
+    at_end = below > -0.5
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], at_end, [False])).astype(np.int8)))
+    count = 0
+    for first, stop in zip(edges[::2], edges[1::2], strict=True):
+        half = 0.5 * float(stop - first)
+        smooth = 0.5 * ((half + _BESIDE) / half) ** 2
+        beside = [below[place] for place in (first - _BESIDE, stop - 1 + _BESIDE) if 0 <= place < len(below)]
+        if half >= 0.5 * _FLAT and beside and float(np.mean(beside)) < -2.0 * smooth - _DEVIATIONS * noise:
+            count += int(stop - first)
+    return count
