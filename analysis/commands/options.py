@@ -115,7 +115,9 @@ def spikes(
     ] = None,
     mass: Annotated[float | None, typer.Option(help="Effective mass of the contact, kg.")] = None,
     restitution: Annotated[float | None, typer.Option(help="Coefficient of restitution, 0 to 1.")] = None,
-    sensitivity: Annotated[float | None, typer.Option(help="Of the load cell, V/N; else that of a simulated one.")] = None,
+    sensitivity: Annotated[
+        float | None, typer.Option(help="Of the load cell, V/N; else that of a simulated one.")
+    ] = None,
     known_impulses: Annotated[
         str | None, typer.Option(help="Impulses of the spikes, N s, with commas: the sensitivity is fitted.")
     ] = None,

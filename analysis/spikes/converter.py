@@ -1,4 +1,4 @@
-"""What the converter of a record leaves of a signal: steps, ends of its range, nothing.
+"""The steps that the converter of a record leaves of a signal.
 
 Between two steps a converter says nothing: noise of less than a step comes out as a few samples of one step more, far
 above the median magnitude, which is 0. A random part of a step, added before the noise is looked at, makes up for it
@@ -24,10 +24,8 @@ _CLEAR, _OFF_GRID = 20.0, 0.1
 _FINE = 10.0
 #: Most distinct values of a converter: 24 bits are never all met in a record.
 _MOST_VALUES = 1 << 18
-#: Samples that lie one after the other at the end of the range, and how far in steps that is from the middle.
-_FLAT, _FAR = 3, 10.0
-#: Samples from there to those that tell a jump from a smooth peak, and the noise granted, in its standard deviations.
-_BESIDE, _DEVIATIONS = 2, 3.0
+#: Levels from which on a signal is no switch, and samples for which a switch stays.
+_FEWEST_LEVELS, _STAYS = 4, 4
 
 
 def converter_step(values: Floats) -> float:
@@ -59,7 +57,17 @@ def converter_step(values: Floats) -> float:
     places = (distinct - distinct[0]) / step
     if np.max(np.abs(places - np.round(places))) > _OFF_GRID:
         return 0.0
+    if distinct.size < _FEWEST_LEVELS and _is_switched(values):
+        return 0.0
     return step if _noise_between(values) < _FINE * step else 0.0
+
+
+def _is_switched(values: Floats) -> bool:
+    """Return whether a signal of a few levels stays where it has gone, as a switch does and noise does not."""
+    levels, counts = np.unique(values, return_counts=True)
+    away = values != levels[np.argmax(counts)]
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], away, [False])).astype(np.int8)))
+    return float(np.median(edges[1::2] - edges[::2])) >= _STAYS
 
 
 def between_steps(length: int, step: float) -> Floats:
@@ -67,50 +75,6 @@ def between_steps(length: int, step: float) -> Floats:
     return step * (np.random.default_rng(0).random(length) - 0.5)
 
 
-def converter_doubts(values: Floats, known_clipped: bool) -> list[str]:
-    """Return what in a record shows that the converter, and not the signal, made it.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-    known_clipped : bool
-        Whether clipped samples are marked already.
-    """
-    if np.ptp(values) == 0.0:
-        return [f"all {values.size} samples are {values[0]:.6g}: the channel is dead"]
-    step = converter_step(values)
-    if not step or known_clipped:
-        return []
-    middle, doubts = float(np.median(values)), []
-    noise = _noise_between(values) / step
-    for words, side in (("largest", 1.0), ("smallest", -1.0)):
-        end = side * float(np.max(side * values))
-        samples = _held(side * (values - end) / step, noise)
-        if samples and abs(end - middle) > _FAR * step:
-            doubts.append(
-                f"{samples} samples lie one after the other at the {words} value, {end:.6g}: the range of the "
-                "converter seems to end there, and peaks and impulses are lower bounds"
-            )
-    return doubts
-
-
 def _noise_between(values: Floats) -> float:
     """Return the noise from one sample to the next, which a motion does not feel."""
     return robust_sigma(np.diff(values)) / float(np.sqrt(2.0))
-
-
-def _held(below: Floats, noise: float) -> int:
-    """Return the samples that are held at 0, the largest value, where they were reached and left at a jump.
-
-    A smooth peak is left as a parabola that was within half a step of its top, and by the noise. Both are in steps.
-    """
-    at_end = below > -0.5
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], at_end, [False])).astype(np.int8)))
-    count = 0
-    for first, stop in zip(edges[::2], edges[1::2], strict=True):
-        half = 0.5 * float(stop - first)
-        smooth = 0.5 * ((half + _BESIDE) / half) ** 2
-        beside = [below[place] for place in (first - _BESIDE, stop - 1 + _BESIDE) if 0 <= place < len(below)]
-        if half >= 0.5 * _FLAT and beside and float(np.mean(beside)) < -2.0 * smooth - _DEVIATIONS * noise:
-            count += int(stop - first)
-    return count

@@ -17,7 +17,6 @@ from vibroimpact.analysis.spikes.baseline import drift_window, running_median
 from vibroimpact.analysis.spikes.converter import (
     LEAST_STEPS,
     between_steps,
-    converter_doubts,
     converter_step,
 )
 from vibroimpact.analysis.spikes.cycle import PeriodicPart, cycle_scores, find_cycle
@@ -265,7 +264,7 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
         interval,
         _remarks(channel, bad, step if noise < step else 0.0)
         + (_unrest(residual[~bad], interval) if method == "threshold" and noise else []),
-        _doubts(channel, signal[~bad])
+        _dead(signal[~bad])
         + (_missed(time, looked_at, noise, threshold, chosen) if method != "cycle_median" else []),
     )
 
@@ -391,9 +390,11 @@ def _unrest(residual: Floats, interval: float) -> list[str]:
     ]
 
 
-def _doubts(channel: Channel, values: Floats) -> list[str]:
-    """Return what in the samples shows that the signal is not what they say."""
-    return converter_doubts(values, bool(np.any(channel.quality & np.uint8(Quality.clipped))))
+def _dead(values: Floats) -> list[str]:
+    """Return a doubt where a channel says nothing."""
+    if np.ptp(values) > 0.0:
+        return []
+    return [f"all {values.size} samples are {values[0]:.6g}: the channel is dead"]
 
 
 def _missed(
