@@ -23,6 +23,8 @@ _LABELS = {
     **dict.fromkeys(("g", "G", "gn", "g0"), "standard_gravity"),
     **dict.fromkeys(("volts", "Volts"), "volt"),
     "Amps": "ampere",
+    # thousandths of an inch; pint's mil is one of an angle
+    **dict.fromkeys(("mil", "mils", "thou"), "thou"),
 }
 _OFFSET_LABELS = ("degC", "deg C", "°C", "Celsius", "degree_Celsius")
 # Preferred SI names, as CF (UDUNITS) writes them.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import zip_longest
 from typing import Any
 
@@ -16,7 +18,7 @@ OVERRANGE_WORDS = frozenset(
     {"ovrng", "ovrrng", "ovr", "ovrn", "over", "overrange", "over-range", "overload", "ovl"}
     | {"ovld", "ol", "o.l.", "+ol", "-ol", "+over", "-over", "over+", "over-", "open", "opn"}
     | {"inf", "+inf", "-inf", "infinity", "-infinity", "+infinity", "1.#inf", "-1.#inf", "1.#infoo"}
-    | {"#overflow", "overflow", "sat", "saturated"}
+    | {"#overflow", "overflow", "sat", "saturated", "\u221e", "+\u221e", "-\u221e"}
 )
 # And these for a sample that they do not have.
 MISSING_WORDS = frozenset(
@@ -37,6 +39,11 @@ _DAY = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}"
 # 29.990,96 and 29,990.96: both signs in one number.
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:\.\d{3})++,\d++|(?:,\d{3})++\.\d++)", re.ASCII)
 _LONGEST_QUOTE = 40
+_DAY_SECONDS = 86_400.0
+_HALF_A_DAY = 0.5 * _DAY_SECONDS
+"""Step back of a clock of the day that is a midnight, s; a smaller one is disorder."""
+_NEXT_DAY = np.datetime64("1970-01-02", "ns")
+"""Times of day without a date are those of 1970-01-01."""
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
@@ -107,6 +114,12 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
     """Return the cells of a line; None splits at blanks."""
     if delimiter is None:
         return line.split()
+    if line.count('"') > 1:
+        # a delimiter between quotes is part of its cell
+        with suppress(csv.Error):
+            return [
+                cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+            ]
     return [cell.strip().strip('"') for cell in line.split(delimiter)]
 
 
@@ -177,6 +190,15 @@ def _read_column(cells: Sequence[str], decimal: str) -> Column:
     return column_of("", values, strange=strange)
 
 
+def _midnights(seconds: Floats) -> Floats:
+    """Return how often a clock of the day has passed midnight up to each row."""
+    there = np.flatnonzero(np.isfinite(seconds))
+    passed = np.zeros(len(seconds))
+    passed[there[1:]] = np.diff(seconds[there]) < -_HALF_A_DAY
+    counted: Floats = np.cumsum(passed)
+    return counted
+
+
 def _read_dates(cells: Sequence[str]) -> Column:
     """Read dates with times of day as seconds after the first one."""
     strange: list[tuple[int, str]] = []
@@ -191,4 +213,6 @@ def _read_dates(cells: Sequence[str]) -> Column:
     if not len(known):
         return Column("", np.full(len(cells), np.nan), strange=strange)
     seconds = (stamps - known[0]) / np.timedelta64(1, "ns") * 1e-9
+    if all(stamp < _NEXT_DAY for stamp in known):
+        seconds += _DAY_SECONDS * _midnights(seconds)
     return Column("", np.asarray(seconds, dtype=np.float64), dated=True, strange=strange)

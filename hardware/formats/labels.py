@@ -15,6 +15,42 @@ _TIME_NAMES = frozenset(
     | {"time_axis", "timevector", "time_vector", "tid", "cas"}
 )
 
+_SMALLEST, _LARGEST, _LONGEST_TIME = 1e-15, 1e12, 86_400.0
+"""SI value of units that somebody measures in; of time, of a day."""
+_GRAVITY = 9.80665
+_LENGTH, _SPEED, _ACCELERATION, _FORCE = "m", "m s-1", "m s-2", "N"
+_WORDS = {
+    word: units
+    for words, units in (
+        (("accel", "acc(?![a-z])", "beschleun"), frozenset({_ACCELERATION, "rad s-2"})),
+        (("veloc", "geschw", "vitesse"), frozenset({_SPEED, "rad s-1"})),
+        (("displac", "deflection", "auslenk"), frozenset({_LENGTH, "rad"})),
+        (("force(?![a-z])", "kraft"), frozenset({_FORCE, "kg"})),
+    )
+    for word in words
+}
+"""Words in headings, with the units that they allow beside electrical ones and pure numbers."""
+_MECHANICAL = frozenset(
+    {
+        _LENGTH,
+        _SPEED,
+        _ACCELERATION,
+        _FORCE,
+        "rad",
+        "rad s-1",
+        "rad s-2",
+        "kg",
+        "s",
+        "Pa",
+        "N m",
+        "J",
+        "W",
+        "Hz",
+    }
+)
+
+_TIME_UNITS = frozenset({"s", "ms", "us", "µs", "μs", "ns"})
+
 LONGEST_LABEL = 120
 """Characters of a heading that are read: it is a name and a unit, and goes into names and messages."""
 
@@ -33,6 +69,15 @@ def split_label(text: str) -> tuple[str, str]:
     return label, ""
 
 
+def is_time_unit(label: str) -> bool:
+    """Whether a heading is a unit of time alone, as `ms` is.
+
+    >>> is_time_unit("ms"), is_time_unit("m")
+    (True, False)
+    """
+    return label in _TIME_UNITS
+
+
 def is_time_name(label: str) -> bool:
     """Whether a heading means time.
 
@@ -43,12 +88,42 @@ def is_time_name(label: str) -> bool:
 
 
 def is_known_unit(label: str) -> bool:
-    """Whether a unit label means anything."""
+    """Whether a unit label means anything that is measured.
+
+    >>> is_known_unit("mV"), is_known_unit("acc"), is_known_unit("velocity")
+    (True, False, False)
+    """
     try:
-        measured_unit(label)
+        meant = measured_unit(label)
     except DatasetError:
         return False
-    return True
+    # an atto-cubic-centimetre, and a year, are headings: acc, a
+    return _SMALLEST <= meant.factor <= (_LONGEST_TIME if meant.si == "s" else _LARGEST)
+
+
+def meant_unit(heading: str, unit: str) -> tuple[str, str]:
+    """Return the unit that a heading with this unit means, and what is to be said of it.
+
+    A mass is no unit of an acceleration, but thousandths of g are. A unit that contradicts its heading is taken for
+    none.
+
+    >>> meant_unit("Acceleration", "mg")[0], meant_unit("Force", "mV")[0], meant_unit("Displacement", "V s")[0]
+    ('0.00980665 m s-2', 'mV', 'V s')
+    >>> meant_unit("Velocity", "mm")
+    ('', "the unit 'mm' is none of what the heading says: taken as a pure number")
+    """
+    word = next((word for word in _WORDS if re.search(rf"(?<![a-z]){word}", heading.lower())), None)
+    if word is None or not unit or not is_known_unit(unit):
+        return unit, ""
+    meant = measured_unit(unit)
+    if meant.si not in _MECHANICAL or meant.si in _WORDS[word]:
+        return unit, ""
+    if meant.si == "kg" and "m s-2" in _WORDS[word]:
+        return (
+            f"{meant.factor * 1e3 * _GRAVITY:.15g} m s-2",
+            f"the unit {unit!r} is taken for a part of g, as the heading says",
+        )
+    return "", f"the unit {unit!r} is none of what the heading says: taken as a pure number"
 
 
 def seconds_in(unit: str) -> float | None:

@@ -21,12 +21,41 @@ from vibroimpact.hardware.formats.cells import (
     split_line,
 )
 from vibroimpact.hardware.formats.cut_off import without_cut_cells
-from vibroimpact.hardware.formats.labels import is_known_unit, is_time_name, seconds_in, split_label
+from vibroimpact.hardware.formats.labels import (
+    is_known_unit,
+    is_time_name,
+    is_time_unit,
+    seconds_in,
+    split_label,
+)
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, RawFile, Table
 
 _COMMENTS = ("#", "%", "//", "!")
 _QUOTED = re.compile(r'"([^"]{1,60})"')
 _FIRST = "column_1"
+_SUMMARIES = frozenset(
+    {
+        "mean",
+        "average",
+        "avg",
+        "rms",
+        "std",
+        "stdev",
+        "std dev",
+        "sigma",
+        "variance",
+        "median",
+        "min",
+        "minimum",
+    }
+    | {"max", "maximum", "sum", "total", "count", "n", "range", "peak", "pk-pk", "peak-peak", "crest"}
+    | {"mittelwert", "mittel", "effektivwert", "standardabweichung", "summe", "anzahl", "moyenne", "somme"}
+)
+"""Words before a number that is one of a whole column, in the lines below a table."""
+_COUNTS = frozenset(
+    {"index", "no", "no.", "nr", "nr.", "#", "sample", "samples", "row", "point", "scan", "record"}
+)
+"""Headings of a column that counts the rows."""
 _LINES_TRIED = 60
 _LONGEST_HEADER = 1000
 _MOST_STRANGE = 0.01
@@ -69,7 +98,9 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
     dialect, remarks = find_dialect(lines, delimiter, decimal)
     first = next(place for place, line in enumerate(lines) if _is_plain(line) and dialect.is_row(line))
     body = [(place, line) for place, line in enumerate(lines[first:], first) if _is_plain(line)]
+    body, summary = _without_summary(body, dialect)
     rows, dropped = _rows(body, dialect)
+    dropped += summary
     rows, cut = without_cut_cells(rows, content, dialect.delimiter, dialect.decimal)
     remarks += dropped + cut
     cells = read_cells(rows, dialect.delimiter, dialect.decimal)
@@ -80,12 +111,17 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
     names = {mark: f"{word}s" for word, mark in DELIMITERS.items()}
     written = f"text, cells between {names.get(dialect.delimiter, repr(dialect.delimiter))}"
     comma = ", decimal comma" if dialect.decimal == "," else ""
-    table = with_time(Table([column for column in columns if len(column.values)]))
-    if table.time is not None and table.time.label == _FIRST:
+    filled = [column for column in columns if len(column.values)]
+    tables = _pairs(filled) or [without_count(with_time(Table(filled)))]
+    if tables[0].time is not None and tables[0].time.label == _FIRST:
         more.append(
             f"the first column has no heading and ascends: it is taken as the instants ({option('time_column')})"
         )
-    return RawFile(written + comma, [table], remarks + late + more)
+    if len(tables) > 1:
+        more.append(
+            f"{len(tables)} columns have instants, each for those that follow it ({option('time_column')})"
+        )
+    return RawFile(written + comma, tables, remarks + late + more)
 
 
 def _is_plain(line: str) -> bool:
@@ -184,6 +220,20 @@ def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str],
     return [line for place, line in body if place not in skipped], remarks[:5]
 
 
+def _without_summary(
+    body: list[tuple[int, str]], dialect: Dialect
+) -> tuple[list[tuple[int, str]], list[str]]:
+    """Return the lines without those of means, scatter and the like that end a table, and a remark on them."""
+    end = len(body)
+    while end > 1 and dialect.cells(body[end - 1][1])[0].strip().lower() in _SUMMARIES:
+        end -= 1
+    if end == len(body):
+        return body, []
+    words = "; ".join(line.strip()[:30] for _, line in body[end:][:3])
+    lines = "line" if len(body) == end + 1 else "lines"
+    return body[:end], [f"the last {len(body) - end} {lines} sum up the table and are left out: {words}"]
+
+
 def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[list[str], list[str]]:
     """Return names and units of as many columns as `width`, as far as the lines before the first row give them.
 
@@ -197,7 +247,8 @@ def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[
     if not found:
         return [""] * width, units
     pairs = [split_label(cell) for cell in found[-1]]
-    return [name for name, _ in pairs], [own or below for (_, own), below in zip(pairs, units, strict=True)]
+    own_units = [own or (name if is_time_unit(name) else "") for name, own in pairs]
+    return [name for name, _ in pairs], [own or below for own, below in zip(own_units, units, strict=True)]
 
 
 def _all_headings(
@@ -242,12 +293,12 @@ def _heading_cells(line: str, width: int, delimiter: str | None) -> list[str]:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a line is one of units: all in brackets, or all known, and not simply short names."""
+    """Whether a line is one of units: all in brackets, or two and all of them known; one may be a short name."""
     filled = [cell for cell in cells if cell]
     if all(cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled):
         return True
     plain = [cell for cell in filled if cell != "-"]
-    return bool(plain) and all(is_known_unit(cell) and not is_time_name(cell) for cell in plain)
+    return len(plain) > 1 and all(is_known_unit(cell) and not is_time_name(cell) for cell in plain)
 
 
 def columns_of(
@@ -285,6 +336,17 @@ def _is_text(column: Column) -> bool:
     return 2 * len(column.strange) >= max(1, int(np.isfinite(column.values).sum()) + len(column.strange))
 
 
+def without_count(table: Table) -> Table:
+    """Return the table without a first column that counts its rows, where another one has the instants."""
+    first = table.columns[0] if table.columns and table.time is not None and table.time_place > 0 else None
+    if first is None or first.label.strip().lower() not in _COUNTS or len(table.columns) < 2:
+        return table
+    steps = np.diff(first.values)
+    if not len(steps) or not np.all(steps == 1.0):
+        return table
+    return replace(table, columns=table.columns[1:], time_place=table.time_place - 1)
+
+
 def with_time(table: Table) -> Table:
     """Return the table with the column of its instants told apart, where one is clear.
 
@@ -297,6 +359,28 @@ def with_time(table: Table) -> Table:
     if len(table.columns) > 1 and table.columns[0].label == _FIRST and _ascends(table.columns[0]):
         return _apart(table, 0)
     return table
+
+
+def _pairs(columns: Sequence[Column]) -> list[Table]:
+    """Return a table for each column of instants with those that follow it, where there are several: `t1 a1 t2 a2`."""
+    clocks = [place for place, column in enumerate(columns) if _is_clock(column)]
+    ends = [*clocks[1:], len(columns)]
+    if (
+        len(clocks) < 2
+        or clocks[0] != 0
+        or any(end - begin < 2 for begin, end in zip(clocks, ends, strict=True))
+    ):
+        return []
+    same = [np.array_equal(columns[0].values, columns[place].values, equal_nan=True) for place in clocks]
+    if all(same):
+        return []
+    return [Table(columns[begin + 1 : end], columns[begin]) for begin, end in zip(clocks, ends, strict=True)]
+
+
+def _is_clock(column: Column) -> bool:
+    """Whether a column has the instants of others: it ascends, and its heading or its unit means time."""
+    name = re.sub(r"[\s_-]*\d{1,3}$", "", column.label)
+    return (column.dated or is_time_name(name) or seconds_in(column.unit) is not None) and _ascends(column)
 
 
 def _apart(table: Table, place: int) -> Table:

@@ -13,7 +13,7 @@ from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.wording import option
-from vibroimpact.hardware.formats.labels import is_known_unit, seconds_in
+from vibroimpact.hardware.formats.labels import is_known_unit, meant_unit, seconds_in
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Table
 from vibroimpact.hardware.recordings.channel_of import channel_of
 from vibroimpact.hardware.recordings.events import event_train, is_raster, looks_like_events, raster_train
@@ -139,7 +139,11 @@ def _length_remarks(table: Table) -> list[str]:
 def _described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:
     """Return a column with the unit, scale and offset that the settings give to column `number` (from 0); remarks."""
     remarks: list[str] = []
-    unit = _picked(settings.unit, number) or column.unit
+    unit, said = _picked(settings.unit, number), ""
+    if unit is None:
+        unit, said = meant_unit(column.label, column.unit)
+    if said:
+        remarks.append(f"{name}: {said} ({option('unit')} if not)")
     if not is_known_unit(unit):
         remarks.append(
             f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number ({option('unit')})"

@@ -1,4 +1,4 @@
-"""Instants that count from 1970: a recording counts from its start."""
+"""Instants that count from 1970, or days of a spreadsheet: a recording counts from its start."""
 
 from __future__ import annotations
 
@@ -7,11 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.table import Column, Table
 from vibroimpact.hardware.recordings.printed_grid import decimal_step
 
 #: Seconds since 1970 from the year 2000 to 2100; no laboratory's clock runs for 30 years.
 _EARLIEST, _LATEST = 946_684_800.0, 4_102_444_800.0
+#: Days of a spreadsheet from 1982 to 2064; its day 0 is 1899-12-30.
+_FIRST_DAY, _LAST_DAY = 30_000.0, 60_000.0
+_DAY_ZERO, _DAY = np.datetime64("1899-12-30", "us"), 86_400.0
+#: Steps below which they are no seconds (50 kHz), and above which they are (10 Hz; 2.4 hours if they were days).
+_FASTEST, _SLOWEST = 2e-5, 0.1
+#: How far an interval may be from a round one, and digits, relative to a step, that a person has printed.
+_ROUND, _PRINTED = 1e-5, 1e-3
 _PARTS = {1.0: "seconds", 1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 
 
@@ -20,6 +29,15 @@ def counted_from_start(tables: Sequence[Table]) -> tuple[list[Table], list[str],
 
     Instants with a unit are in s; those without one are in the unit that their size tells.
     """
+    tables, days = _in_seconds_of_days(tables)
+    if days:
+        return (
+            list(tables),
+            [
+                f"the instants are days of a spreadsheet: they are counted from {days} ({option('rate')} if not)"
+            ],
+            {"source_date": days},
+        )
     counting = [
         (table.time, part)
         for table in tables
@@ -32,6 +50,66 @@ def counted_from_start(tables: Sequence[Table]) -> tuple[list[Table], list[str],
     what = " and ".join(dict.fromkeys(_PARTS[part] for _, part in counting))
     remark = f"the instants are {what} since 1970: they are counted from {date} (UTC)"
     return [_since(table, origin) for table in tables], [remark], {"source_date": date}
+
+
+def _in_seconds_of_days(tables: Sequence[Table]) -> tuple[Sequence[Table], str]:
+    """Return tables whose instants were days of a spreadsheet in s, and the date of the first; no date, if none were.
+
+    Raises
+    ------
+    DatasetError
+        They may be days, or seconds.
+    """
+    found = [table.time for table in tables if table.time is not None and _are_days(table.time)]
+    if not found:
+        return tables, ""
+    times = [time.values[np.isfinite(time.values)] for time in found]
+    origin = min(float(values[0]) for values in times)
+    date = str(_DAY_ZERO + np.timedelta64(round(origin * _DAY * 1e6), "us"))
+    left = float(np.spacing(max(float(values[-1]) for values in times))) * _DAY
+
+    def counted(time: Column) -> Column:
+        digits = 10.0 ** np.ceil(np.log10(left))
+        return replace(time, values=np.rint((time.values - origin) * _DAY / digits) * digits, unit="s")
+
+    return [
+        replace(table, time=counted(table.time))
+        if table.time is not None and _are_days(table.time)
+        else table
+        for table in tables
+    ], date
+
+
+def _are_days(time: Column) -> bool:
+    """Whether instants without a unit are days of a spreadsheet: as seconds they would be odd, as days they are not.
+
+    Raises
+    ------
+    DatasetError
+        They may be either.
+    """
+    known = time.values[np.isfinite(time.values)]
+    if time.unit or time.dated or len(known) < 3 or known[0] < _FIRST_DAY or known[-1] > _LAST_DAY:
+        return False
+    step = float(np.median(np.diff(known)))
+    # seconds are printed with few digits; days have as many as there are
+    if not 0.0 < step < _SLOWEST or decimal_step(known) >= _PRINTED * step:
+        return False
+    lost = 2.0 * float(np.spacing(known[-1])) / step
+    if not _is_round(step * _DAY, lost):
+        return False
+    if step > _FASTEST and _is_round(step, lost):
+        raise DatasetError(
+            f"column of instants: expected seconds, got {known[0]:.6g} and on in steps of {step:.3g}: seconds, "
+            f"or days of a spreadsheet. Give {option('rate')} (samples per second)."
+        )
+    return True
+
+
+def _is_round(interval: float, lost: float) -> bool:
+    """Whether an interval, or its rate, is a whole number, of which binary has lost so much."""
+    larger = max(interval, 1.0 / interval)
+    return abs(larger - round(larger)) < (_ROUND + lost) * larger
 
 
 def _parts_of(time: Column) -> float | None:
