@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
-from vibroimpact.analysis.orbits.recorded import Impacts
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits.recorded import Impacts, recorded_orbit
 from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError
 
@@ -64,7 +65,8 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     """Return the Lyapunov exponents of a motion from its impacts.
 
     The state follows from the impacts before, by the exact flow: what is not known of the first one decays with the
-    modes, and impacts count from where it is forgotten. The sum rule is checked.
+    modes, and impacts count from where it is forgotten. The sum rule is checked. Of a periodic motion with too few
+    impacts for that, the multipliers of its orbit are taken, which have no error.
 
     Parameters
     ----------
@@ -85,10 +87,13 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     elapsed = np.diff(impacts.times, prepend=impacts.times[0])
     first = _first_that_counts(body, impacts)
     if count - first < LEAST:
-        raise ExponentError(
-            f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
-            "Record more periods."
-        )
+        try:
+            return _of_orbit(recorded_orbit(body, impacts).orbit)
+        except OrbitError:
+            raise ExponentError(
+                f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
+                "Record more periods."
+            ) from None
     moving = Stretching(
         body.kernel,
         impacts.contacts.astype(np.int32),
@@ -116,6 +121,21 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
         )
     error = means.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
     return Exponents(per_impact[order], error[order], interval, counted, off)
+
+
+def _of_orbit(orbit: PeriodicOrbit) -> Exponents:
+    """Return the exponents of a periodic orbit: the logarithms of its multipliers, over its impacts."""
+    sizes = np.abs(orbit.multipliers)
+    if not (sizes > 0.0).all():
+        raise OrbitError("an orbit that grazes, or that forgets all, has no logarithms of its multipliers")
+    count = orbit.phases.size
+    per_impact = np.log(sizes) / count
+    exact = float(np.log(orbit.exact_determinant)) / count
+    off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
+    if not off <= SUM_RULE:
+        raise OrbitError("its multipliers break the sum rule")
+    interval = orbit.periods * TURN / orbit.body.angular_frequency / count
+    return Exponents(per_impact, np.zeros(sizes.size), interval, count, off)
 
 
 def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:

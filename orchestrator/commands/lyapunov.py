@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.commands.energies import runs_of, write_found
 from vibroimpact.orchestrator.orbits.lyapunov import lyapunov
 
+_NUMBER = re.compile(r"\d+")
 _MOST_SHOWN = 30
 """Runs that are told one by one."""
 
@@ -36,12 +37,23 @@ def show_exponents(
         except DatasetError as problem:
             raise DatasetError(f"{path}: {problem}") from problem
     reasons = [str(text) for text in found.reason.values.ravel() if str(text) != "no run"]
+    counted = _counted([text for text in reasons if text])
     if all(reasons):
-        raise DatasetError(f"{path}: lyapunov: expected runs with exponents, got none: {reasons[0]}")
+        told = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counted)
+        raise DatasetError(f"{path}: lyapunov: expected runs with exponents, got none. {told}")
     _print(found)
-    for words, count in Counter(text for text in reasons if text).most_common():
+    for words, count in counted:
         say(f"{count} without: {words}")
     write_found(found.assign_attrs(scene_file=str(path)), "lyapunov", output, figure)
+
+
+def _counted(reasons: Sequence[str]) -> list[tuple[str, int]]:
+    """Return reasons with how many runs have them, the commonest first; of those that differ by numbers, the first."""
+    kinds: dict[str, list[str]] = {}
+    for text in reasons:
+        kinds.setdefault(_NUMBER.sub("#", text), []).append(text)
+    ordered = sorted(kinds.values(), key=len, reverse=True)
+    return [(each[0] + (" (the first of them)" if len(set(each)) > 1 else ""), len(each)) for each in ordered]
 
 
 def _print(found: xr.Dataset) -> None:

@@ -21,7 +21,7 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset or path
         As `open_dataset` or `run` gives it, or its file or folder: of an oscillator, a chain or a beam on restitution
-        stops, with impacts; 200 of them at least count.
+        stops, with impacts: 200 that count, or two rounds of a periodic orbit.
 
     Returns
     -------

@@ -62,6 +62,34 @@ def test_exponents_of_a_periodic_orbit_of_a_chain_are_the_logarithms_of_its_mult
     assert float(found.lyapunov_exponent.sum()) == pytest.approx(np.log(orbit.exact_determinant), rel=1e-9)
 
 
+@pytest.mark.parametrize("given", [CHAIN, {**CHAOS, "forcing": {"amplitude": 1.0, "angular_frequency": 2.0}}])
+def test_a_periodic_run_of_few_impacts_has_the_multipliers_of_its_orbit(given: dict[str, Any]) -> None:
+    record = {"transient_periods": 600, "impacts": True}
+    few, many = (
+        vi.lyapunov(vi.run({**given, "record": record | {"recorded_periods": count}})) for count in (20, 2000)
+    )
+    assert str(few.reason.item()) == ""
+    assert int(few.impacts) < 20
+    np.testing.assert_allclose(few.lyapunov_exponent, many.lyapunov_exponent, atol=3e-3)
+    np.testing.assert_allclose(few.impact_interval, many.impact_interval, rtol=1e-9)
+    assert not few.standard_error.any()
+
+
+def test_reasons_are_counted_and_the_commonest_comes_first(tmp_path: Path) -> None:
+    sweep = {"forcing.angular_frequency": {"values": [2.6, 2.7, 2.8, 2.75]}}
+    scene = {
+        **CHAOS,
+        "record": {"transient_periods": 5, "recorded_periods": 20, "impacts": True},
+        "sweep": sweep,
+    }
+    vi.run(scene, tmp_path / "runs.nc")
+    done = in_this_process("lyapunov", tmp_path / "runs.nc")
+    assert done.returncode == 2
+    assert "got none. 4 of 4: expected 200 impacts after the 51 of a transient" in " ".join(
+        done.stderr.split()
+    )
+
+
 def test_the_exponents_of_a_sweep_are_a_variable_and_a_figure(tmp_path: Path) -> None:
     sweep = {"forcing.angular_frequency": {"values": [0.72, 0.8, 1.2, 1.58]}}
     record = {"transient_periods": 300, "recorded_periods": 400, "impacts": True}
