@@ -18,7 +18,7 @@ from vibroimpact.analysis.spikes import Mechanics, SpikeReport, SpikeSettings, s
 from vibroimpact.analysis.spikes.printing import print_spikes
 from vibroimpact.analysis.spikes.report import unobserved
 from vibroimpact.fmus.errors import EstimationError, UsageError
-from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 #: Fewer spikes have no statistics of intervals.
 _FEWEST_FOR_INTERVALS = 3
@@ -52,7 +52,7 @@ def find_spikes(
     same = ("spikes", data.name)
     refuse_overwriting(output, force, lambda there: (there.get("results_kind"), there.get("source")) == same)
     recording = open_signals(data, run)
-    console = Terminal()
+    console = wide_terminal()
     for remark in recording.remarks_counted:
         console.print(remark, style="yellow")
     report = None

@@ -252,27 +252,28 @@ def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
 
 
 def _estimates(estimates: ImpactEstimates) -> Table:
-    """Return quantities by methods."""
-    methods = [name for name in SHOWN if name in estimates.values]
+    """Return a block of methods for each quantity: as many as answer, side by side they would not be read."""
     title = f"{estimates.channel}: estimates with {estimates.confidence:.0%} intervals"
-    rows = table(title, "<quantity", "<unit", *(f">{method.replace('_', ' ')}" for method in methods))
+    rows = table(title, "<quantity", "<method", ">estimate", ">from", ">to", "<unit")
     for quantity in QUANTITIES:
-        cells = [estimates.values[method].get(quantity) for method in methods]
-        if any(cells):
-            words = quantity.replace("_", " ")
-            rows.add_row(words, written_unit(estimates.unit_of(quantity)), *(_cell(cell) for cell in cells))
+        words, unit = quantity.replace("_", " "), written_unit(estimates.unit_of(quantity))
+        for method in SHOWN:
+            found = estimates.values.get(method, {}).get(quantity)
+            if found is not None:
+                rows.add_row(words, method.replace("_", " "), *_cells(found), unit)
+                words = unit = ""
+        if not words:
+            rows.add_section()
     return rows
 
 
-def _cell(estimate: MethodEstimate | None) -> str:
+def _cells(estimate: MethodEstimate) -> tuple[str, str, str]:
     """Return value and interval with the digits that the doubt leaves."""
-    if estimate is None:
-        return ""
     if not math.isfinite(estimate.standard_error):
-        return f"{estimate.value:.4g}"
+        return f"{estimate.value:.4g}", "", ""
     ends = (estimate.value, estimate.low, estimate.high)
     value, low, high = (value_and_error(end, estimate.standard_error)[0] for end in ends)
-    return f"{value} [{low}, {high}]" if estimate.standard_error > 0.0 else value
+    return (value, low, high) if estimate.standard_error > 0.0 else (value, "", "")
 
 
 def _conditioning(estimates: ImpactEstimates) -> Table:

@@ -105,7 +105,7 @@ OTHERS: Rows = {
     "estimate response signal.nc --drive absent": (ASKED, 2),
     "spikes signal.nc": (ASKED, 0),
     "fmu replay signal.nc -o signal.fmu": (ASKED, 0),
-    "lyapunov swept.nc": (ASKED, 2),
+    "lyapunov swept.nc": (ASKED, 0),
     "energies swept.nc": (ASKED, 0),
     "resonances swept.nc": (ASKED, 2),
     "basins scene.toml --points 5": (ASKED, 0),

@@ -70,11 +70,13 @@ def marked(value: str) -> list[psutil.Process]:
     found = []
     for process in psutil.process_iter():
         try:
-            if process.pid != os.getpid() and process.environ().get(MARK) == value:
+            own = process.pid != os.getpid() and process.environ().get(MARK) == value
+            if own and process.status() != psutil.STATUS_ZOMBIE:
                 found.append(process)
         except psutil.Error:
+            # it has ended meanwhile
             continue
-    return [p for p in found if p.is_running() and p.status() != psutil.STATUS_ZOMBIE]
+    return found
 
 
 @pytest.fixture

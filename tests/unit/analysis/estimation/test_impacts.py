@@ -173,6 +173,10 @@ def test_table_and_dataset_have_every_method_side_by_side(tmp_path):
     text = out.getvalue()
     for words in ("restitution", "weak form", "joint damping ratio per relative velocity", "m/s", "note:"):
         assert words in text
+    narrow = io.StringIO()
+    print_impacts(Console(file=narrow, width=80), found)
+    assert "…" not in narrow.getvalue()
+    assert "  restitution          energy joint" in narrow.getvalue()
 
 
 def test_unknown_method_is_refused_with_the_names():
