@@ -1,5 +1,6 @@
 import io
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -176,7 +177,7 @@ def test_table_and_dataset_have_every_method_side_by_side(tmp_path):
     narrow = io.StringIO()
     print_impacts(Console(file=narrow, width=80), found)
     assert "…" not in narrow.getvalue()
-    assert "  restitution          energy joint" in narrow.getvalue()
+    assert re.search(r"^ *restitution +energy ", narrow.getvalue(), re.MULTILINE)
 
 
 def test_unknown_method_is_refused_with_the_names():
