@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
-from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit
-from vibroimpact.analysis.orbits.recorded import Impacts, recorded_orbit
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError
+from vibroimpact.analysis.orbits.recorded import Impacts, RecordedOrbit, recorded_orbit
 from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError
 
@@ -21,6 +21,8 @@ BLOCKS = 20
 """Parts of a run whose scatter gives the standard error."""
 LEAST = 10 * BLOCKS
 """Impacts that count, at least."""
+_ON_ORBIT = 1e-6
+"""Largest distance of impacts from an orbit that they are taken to follow for ever, see `RecordedOrbit`."""
 SUM_RULE = 1e-10
 """Largest difference of the sum of all exponents from its exact value, over the size of their terms."""
 
@@ -88,7 +90,7 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     first = _first_that_counts(body, impacts)
     if count - first < LEAST:
         try:
-            return _of_orbit(recorded_orbit(body, impacts).orbit)
+            return _of_orbit(recorded_orbit(body, impacts))
         except OrbitError:
             raise ExponentError(
                 f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
@@ -123,8 +125,11 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     return Exponents(per_impact[order], error[order], interval, counted, off)
 
 
-def _of_orbit(orbit: PeriodicOrbit) -> Exponents:
+def _of_orbit(recorded: RecordedOrbit) -> Exponents:
     """Return the exponents of a periodic orbit: the logarithms of its multipliers, over its impacts."""
+    if recorded.distance > _ON_ORBIT:
+        raise OrbitError("chaos passes unstable orbits, near which it stays a while")
+    orbit = recorded.orbit
     sizes = np.abs(orbit.multipliers)
     if not (sizes > 0.0).all():
         raise OrbitError("an orbit that grazes, or that forgets all, has no logarithms of its multipliers")

@@ -2,7 +2,7 @@
 
 Between two steps a converter says nothing: noise of less than a step comes out as a few samples of one step more, far
 above the median magnitude, which is 0. A random part of a step, added before the noise is looked at, makes up for it
-(Widrow and Kollar 2008, section 19): what is found then is the noise and that of the steps, step / sqrt(12), together.
+(dither; Widrow and Kollar 2008): what is found then is the noise and that of the steps, step / sqrt(12), together.
 """
 
 from __future__ import annotations

@@ -404,7 +404,8 @@ def _missed(
     from scipy.special import ndtr
 
     level = _SEEN_BY_EYE * noise
-    if not 0.0 < level < threshold:
+    asked = settings.threshold is not None or settings.threshold_part is not None
+    if asked or not 0.0 < level < threshold:
         return []
     high = find_excursions(time, statistic, level, settings.hysteresis)
     groups, _ = group_excursions(high, time, settings.merge, 1)

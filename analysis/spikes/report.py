@@ -88,6 +88,7 @@ def spike_report(
         known.sensitivity is None
         and known.known_impulses is None
         and channel.attrs.get("role") == "simulated"
+        and channel.unit == "V"
     ):
         known = replace(known, sensitivity=channel.attrs.get("sensitivity"))
     if known.known_impulses is not None:

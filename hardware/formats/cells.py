@@ -191,7 +191,7 @@ def _read_column(cells: Sequence[str], decimal: str) -> Column:
 
 
 def _midnights(seconds: Floats) -> Floats:
-    """Return how often a clock of the day has passed midnight up to each row."""
+    """Return the midnights that a clock of the day has passed up to each row."""
     there = np.flatnonzero(np.isfinite(seconds))
     passed = np.zeros(len(seconds))
     passed[there[1:]] = np.diff(seconds[there]) < -_HALF_A_DAY

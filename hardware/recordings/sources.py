@@ -62,7 +62,7 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     with naming(path):
         delimiter = "" if own.delimiter is None else DELIMITERS[own.delimiter]
         raw = read_raw(path, delimiter, own.decimal or "")
-        chosen, counted, date = counted_from_start(chosen_tables(raw, own))
+        chosen, counted, date = counted_from_start(chosen_tables(raw, own), own.rate)
         tables, joints = joined(chosen)
         pieces = [split_at_restarts(table) for table in tables]
     remarks = [

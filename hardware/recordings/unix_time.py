@@ -19,17 +19,20 @@ _FIRST_DAY, _LAST_DAY = 30_000.0, 60_000.0
 _DAY_ZERO, _DAY = np.datetime64("1899-12-30", "us"), 86_400.0
 #: Steps below which they are no seconds (50 kHz), and above which they are (10 Hz; 2.4 hours if they were days).
 _FASTEST, _SLOWEST = 2e-5, 0.1
-#: How far an interval may be from a round one, and digits, relative to a step, that a person has printed.
+#: Distance of an interval from a round one, and digits that a person prints, both relative to it.
 _ROUND, _PRINTED = 1e-5, 1e-3
 _PARTS = {1.0: "seconds", 1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 
 
-def counted_from_start(tables: Sequence[Table]) -> tuple[list[Table], list[str], dict[str, str]]:
+def counted_from_start(
+    tables: Sequence[Table], rate: float | None = None
+) -> tuple[list[Table], list[str], dict[str, str]]:
     """Let instants that count from 1970 count from the first of them; return tables, remarks and `source_date`.
 
     Instants with a unit are in s; those without one are in the unit that their size tells.
+    Where the user gives a `rate`, none are days.
     """
-    tables, days = _in_seconds_of_days(tables)
+    tables, days = _in_seconds_of_days(tables) if rate is None else (tables, "")
     if days:
         return (
             list(tables),

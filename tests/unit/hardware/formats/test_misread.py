@@ -105,6 +105,9 @@ def test_seconds_of_the_day_stay_seconds(step: float, digits: int, tmp_path: Pat
 def test_what_may_be_days_or_seconds_is_asked_about(step: float, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="seconds, or days of a spreadsheet"):
         read(tmp_path, ["Time,Acc (g)", *rows(each(step, 43_500.5, 12))])
+    answered = import_recording(tmp_path / "record.csv", {"rate": 1200.0})
+    assert answered.channels["acc"].axis.rate == pytest.approx(1200.0)
+    assert answered.channels["acc"].values.size == COUNT
 
 
 def test_a_clock_of_the_day_passes_midnight(tmp_path: Path) -> None:
