@@ -24,7 +24,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # before a test imports them: this process is forked
 os.environ |= WITHOUT_THREADS
 
-pytest_plugins = ["harness.costs", "harness.side_by_side"]
+pytest_plugins = ["harness.costs", "harness.side_by_side", "support.cluster"]
 
 SEED = 4
 """Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""

@@ -247,7 +247,7 @@ def test_a_continuation_of_a_chain_is_the_same_however_it_is_cut_into_chunks(tmp
 
 
 def test_a_campaign_over_a_beam_that_was_broken_off_resumes_with_the_same_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cluster: str
 ) -> None:
     text = text_of("beam", transient=10, recorded=2)
     text += '[sweep]\n"body.length" = { start = 0.24, stop = 0.26, points = 8, path = "up" }\n'
@@ -262,12 +262,12 @@ def test_a_campaign_over_a_beam_that_was_broken_off_resumes_with_the_same_rows(
     with monkeypatch.context() as patch:
         patch.setattr(campaigns, "compact", stop)
         with pytest.raises(Stopped):
-            run_campaign(scene, tmp_path / "broken", workers=1)
+            run_campaign(scene, tmp_path / "broken", scheduler=cluster)
     parts = sorted((tmp_path / "broken" / "parts").glob("*.nc"))
     kept = list_parts(tmp_path / "broken" / "parts", scene_hash(scene), print)
     assert kept[0].carried is None or len(kept[0].carried) == 8
     parts[-1].unlink()  # as if the process had been killed before it was written
-    report = run_campaign(scene, tmp_path / "broken", workers=1)
+    report = run_campaign(scene, tmp_path / "broken", scheduler=cluster)
     assert report.runs == 8
     run_scene(scene, tmp_path / "whole.nc")
     assert_same_rows(report.dataset, tmp_path / "whole.nc")

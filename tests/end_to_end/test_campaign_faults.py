@@ -35,13 +35,6 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals a
 
 
 @pytest.fixture(scope="module")
-def cluster() -> Iterator[str]:
-    """Yield the address of a scheduler with two workers: campaigns that lose none of theirs need not start them."""
-    with started_cluster() as address:
-        yield address
-
-
-@pytest.fixture(scope="module")
 def uninterrupted(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Path]:

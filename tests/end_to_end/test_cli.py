@@ -179,11 +179,11 @@ def test_a_campaign_of_one_process_has_the_rows_of_a_run(
 
 
 @pytest.mark.parametrize("path", ["independent", "up-down"])
-def test_run_and_campaign_give_bit_identical_rows(tmp_path: Path, path: str) -> None:
+def test_run_and_campaign_give_bit_identical_rows(tmp_path: Path, path: str, cluster: str) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(small_sweep(path))
     assert in_this_process("run", scene, "-o", tmp_path / "run.nc").returncode == 0
-    done = vibroimpact("campaign", scene, "-o", tmp_path / "campaign", "--workers", "2")
+    done = vibroimpact("campaign", scene, "-o", tmp_path / "campaign", "--scheduler", cluster)
     assert done.returncode == 0, done.stderr
     assert_same_rows(tmp_path / "run.nc", tmp_path / "campaign" / "dataset.nc")
 

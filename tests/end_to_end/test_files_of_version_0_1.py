@@ -58,9 +58,9 @@ def test_a_scene_gives_the_motion_that_it_gave(old: Path, name: str, tolerance: 
         np.testing.assert_allclose(now[variable], before[variable], rtol=tolerance, atol=tolerance)
 
 
-def test_a_finished_campaign_has_nothing_left_to_do(old: Path) -> None:
+def test_a_finished_campaign_has_nothing_left_to_do(old: Path, cluster: str) -> None:
     before = (old / "done" / "dataset.nc").read_bytes()
-    done = vibroimpact("campaign", old / "campaign.toml", "-o", old / "done")
+    done = vibroimpact("campaign", old / "campaign.toml", "-o", old / "done", "--scheduler", cluster)
     assert done.returncode == 0, done.stderr
     assert (old / "done" / "dataset.nc").read_bytes() == before
 
@@ -78,11 +78,11 @@ def half_of_this_engine(old: Path, **more: Any) -> Path:
     return half
 
 
-def refused_with_its_parts_kept(half: Path, old: Path) -> str:
+def refused_with_its_parts_kept(half: Path, old: Path, cluster: str) -> str:
     """Return the one line with which a half-done campaign is refused, which changes nothing in its folder."""
     manifest = (half / "campaign.json").read_bytes()
     parts = {path: path.read_bytes() for path in (half / "parts").iterdir()}
-    done = vibroimpact("campaign", old / "half.toml", "-o", half)
+    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--scheduler", cluster)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "choose another folder" in done.stderr
@@ -91,17 +91,19 @@ def refused_with_its_parts_kept(half: Path, old: Path) -> str:
     return done.stderr
 
 
-def test_a_half_done_campaign_of_the_engine_before_is_refused_in_one_line(old: Path) -> None:
-    assert f"engine was 1, is {ENGINE}" in refused_with_its_parts_kept(old / "half", old)
+def test_a_half_done_campaign_of_the_engine_before_is_refused_in_one_line(old: Path, cluster: str) -> None:
+    assert f"engine was 1, is {ENGINE}" in refused_with_its_parts_kept(old / "half", old, cluster)
 
 
-def test_a_half_done_campaign_of_other_components_is_refused_in_one_line(old: Path) -> None:
-    said = refused_with_its_parts_kept(half_of_this_engine(old), old)
+def test_a_half_done_campaign_of_other_components_is_refused_in_one_line(old: Path, cluster: str) -> None:
+    said = refused_with_its_parts_kept(half_of_this_engine(old), old, cluster)
     assert "fmu_hashes.body was" in said
     assert "restitution = 0.5) is stored as" in said
 
 
-def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equal(old: Path) -> None:
+def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equal(
+    old: Path, cluster: str
+) -> None:
     half = half_of_this_engine(old)
     # as it was begun: in lanes, which "auto" chooses for a new one, last bits are others
     done = vibroimpact("run", old / "half.toml", "--set", "execution.how=fused", "-o", old / "now.nc")
@@ -110,21 +112,21 @@ def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equa
     now = take_runs(read_flat(old / "now.nc"), np.arange(3))
     now = now.drop_vars(constant_names(now))
     write_dataset(now.assign_attrs(read_flat(part).attrs), part)
-    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--workers", "1")
+    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--scheduler", cluster)
     assert done.returncode == 0, done.stderr
     assert "3 of its points computed again are equal bit for bit" in done.stderr
     resumed = read_flat(half / "dataset.nc")
     assert resumed.attrs["fmu_hashes"] == json.dumps(components_of(half)["fmu_hashes"])
     assert len(json.loads(resumed.attrs["continued_with"])) == 1
-    again = vibroimpact("campaign", old / "half.toml", "-o", half)
+    again = vibroimpact("campaign", old / "half.toml", "-o", half, "--scheduler", cluster)
     assert again.returncode == 0, again.stderr
 
 
-def test_a_half_done_campaign_goes_on_from_its_parts(old: Path) -> None:
+def test_a_half_done_campaign_goes_on_from_its_parts(old: Path, cluster: str) -> None:
     half = half_of_this_engine(old, fmu_hashes={"body": BodyDriver({}, {}).hashes["body"]})
     [part] = (half / "parts").iterdir()
     kept = read_flat(part).impact_time.values
-    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--workers", "1")
+    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--scheduler", cluster)
     assert done.returncode == 0, done.stderr
     resumed = read_flat(half / "dataset.nc")
     assert resumed.sizes["run"] == 6

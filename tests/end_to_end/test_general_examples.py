@@ -109,11 +109,11 @@ def test_a_ball_without_events_bounces_where_it_must(tmp_path: Path) -> None:
     comes_back(tmp_path, "bouncing_ball")
 
 
-def test_a_campaign_over_a_single_component_finishes(tmp_path: Path) -> None:
+def test_a_campaign_over_a_single_component_finishes(tmp_path: Path, cluster: str) -> None:
     shutil.copy(bouncing_ball(tmp_path), tmp_path / "BouncingBall.fmu")
     expected = read_flat(ran(tmp_path, "bouncing_ball"))
     folder = tmp_path / "campaign"
-    done = vibroimpact("campaign", tmp_path / "bouncing_ball.toml", "-o", folder, "--workers", "1")
+    done = vibroimpact("campaign", tmp_path / "bouncing_ball.toml", "-o", folder, "--scheduler", cluster)
     assert done.returncode == 0, done.stderr
     dataset = read_flat(folder / "dataset.nc")
     assert np.array_equal(dataset.event_time.values, expected.event_time.values)

@@ -326,14 +326,16 @@ def campaign(scene: Path, output: Path, *options: str) -> subprocess.CompletedPr
     return vibroimpact("campaign", scene, "-o", output, *options)
 
 
-def test_a_campaign_goes_on_without_the_points_that_crash_hang_or_fail(folder: Path, tmp_path: Path) -> None:
+def test_a_campaign_goes_on_without_the_points_that_crash_hang_or_fail(
+    folder: Path, tmp_path: Path, cluster: str
+) -> None:
     faults = [f for f in FAULTS if f not in ("log_flood", "print_flood")]
     numbers = [float(FAULTS.index(f)) for f in faults]
     path = folder / "campaign.toml"
     path.write_text(
         scene_text("3.0", IMPATIENCE, f'"culprit.fault" = {{ values = {numbers} }}'), encoding="utf-8"
     )
-    done = campaign(path, tmp_path / "out", "--workers", "2")
+    done = campaign(path, tmp_path / "out", "--scheduler", cluster)
     assert "Traceback" not in done.stderr
     assert done.returncode == 0, done.stderr
     dataset = read_flat(tmp_path / "out" / "dataset.nc")
@@ -345,7 +347,7 @@ def test_a_campaign_goes_on_without_the_points_that_crash_hang_or_fail(folder: P
 
 
 def test_a_sweep_over_the_time_of_a_crash_has_all_points_that_end_before_it(
-    folder: Path, tmp_path: Path
+    folder: Path, tmp_path: Path, cluster: str
 ) -> None:
     path = folder / "times.toml"
     sweep = '"culprit.fault_time" = { start = 0.05, stop = 1.95, points = 10 }'
@@ -353,7 +355,7 @@ def test_a_sweep_over_the_time_of_a_crash_has_all_points_that_end_before_it(
         'fault = "none", fault_time = 0.35', 'fault = "segfault"'
     )
     path.write_text(text, encoding="utf-8")
-    done = campaign(path, tmp_path / "out", "--workers", "2")
+    done = campaign(path, tmp_path / "out", "--scheduler", cluster)
     assert done.returncode == 0, done.stderr
     dataset = read_flat(tmp_path / "out" / "dataset.nc")
     times = dataset["fault_time"].values
@@ -362,7 +364,7 @@ def test_a_sweep_over_the_time_of_a_crash_has_all_points_that_end_before_it(
     assert set(outcomes[times < 1.0]) == {int(Outcome.crash)}
     messages = [str(m) for m in dataset["message"].values[times < 1.0]]
     assert all("SIGSEGV" in m and m.startswith("culprit: fmi2DoStep at time ") for m in messages)
-    resumed = campaign(path, tmp_path / "out", "--workers", "2")
+    resumed = campaign(path, tmp_path / "out", "--scheduler", cluster)
     assert resumed.returncode == 0, resumed.stderr
     again = read_flat(tmp_path / "out" / "dataset.nc")
     np.testing.assert_array_equal(

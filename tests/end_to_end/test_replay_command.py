@@ -62,7 +62,9 @@ def test_replay_fits_scores_draws_and_gives_its_verdict(folder: Path) -> None:
     assert drawn.returncode == 0, drawn.stderr
 
 
-def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(folder: Path) -> None:
+def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(
+    folder: Path, cluster: str
+) -> None:
     scene = folder / "grid.toml"
     scene.write_text(BOARD + '[sweep]\n"body.frequency" = { values = [800.0, 812.0, 824.0] }\n')
     command = (
@@ -72,8 +74,8 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(fol
         folder / "two.nc",
         "-o",
         folder / "campaign",
-        "--workers",
-        "1",
+        "--scheduler",
+        cluster,
     )
     done = in_this_process(*command)
     assert done.returncode == 0, done.stderr

@@ -232,14 +232,18 @@ def test_ctrl_c_leaves_no_file_wherever_it_is_heard(where: str, tmp_path: Path) 
     assert os.listdir(tmp_path) == ["long.toml"]
 
 
-def test_every_point_of_a_campaign_whose_steps_are_long_gets_its_outcome(tmp_path: Path) -> None:
+def test_every_point_of_a_campaign_whose_steps_are_long_gets_its_outcome(
+    tmp_path: Path, cluster: str
+) -> None:
     name, values = STIFF_AND_PLASTIC
     text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
     for key, value in values.items():
         text = re.sub(rf"^{key} = .*$", f"{key} = {value}", text, count=1, flags=re.M)
     sweep = f'[sweep]\n"forcing.amplitude[1]" = {{ values = [0.5, 0.6, 0.7] }}\n[execution]\ndeadline = {DEADLINE}\n'
     (tmp_path / "scene.toml").write_text(f"{text}\n{sweep}")
-    done = in_this_process("campaign", tmp_path / "scene.toml", "-o", tmp_path / "out", "--workers", "1")
+    done = in_this_process(
+        "campaign", tmp_path / "scene.toml", "-o", tmp_path / "out", "--scheduler", cluster
+    )
     assert done.returncode == 0, done.stderr
     outcomes = read_flat(tmp_path / "out" / "dataset.nc")["outcome"].values
     np.testing.assert_array_equal(outcomes, [Outcome.timeout] * 3)

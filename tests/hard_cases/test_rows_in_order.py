@@ -66,9 +66,9 @@ def test_an_impact_within_a_longer_contact_comes_after_its_touch_down(
     assert dataset.impact_time.values[:2] == pytest.approx([np.pi / 4.0, 1.2], abs=1e-12)
 
 
-def test_a_campaign_with_impacts_within_contacts_ends_in_its_dataset(tmp_path: Path) -> None:
+def test_a_campaign_with_impacts_within_contacts_ends_in_its_dataset(tmp_path: Path, cluster: str) -> None:
     scene = parse_scene(TWO_MASSES.format(second=RIGID, how="fused") + SWEEP, "order.toml")
-    run_campaign(scene, tmp_path / "campaign", workers=1)
+    run_campaign(scene, tmp_path / "campaign", scheduler=cluster)
     assert_ordered(tmp_path / "campaign" / "dataset.nc", 3)
 
 

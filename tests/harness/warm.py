@@ -30,6 +30,7 @@ WITHOUT_THREADS = {"OPENBLAS_NUM_THREADS": "1", "JE_ARROW_MALLOC_CONF": "backgro
 """Variables that keep numpy and pyarrow from starting threads, which a fork loses, when they are imported."""
 
 _server: tuple[subprocess.Popen[str], tempfile.TemporaryDirectory[str]] | None = None
+_ready = False
 _seconds = 0.0
 _lock = threading.Lock()
 
@@ -60,17 +61,19 @@ def start_server() -> None:
 
 def wait_for_server() -> None:
     """Wait until the warm process has imported all, if there is one."""
-    if _server is not None:
+    global _ready
+    if _server is not None and not _ready:
         assert _server[0].stdout is not None
         assert _server[0].stdout.readline() == "ready\n", "the warm process for commands did not start"
+        _ready = True
 
 
 def end_server() -> None:
     """End the warm process, if there is one."""
-    global _server
+    global _server, _ready
     if _server is not None:
         process, folder = _server
-        _server = None
+        _server, _ready = None, False
         process.communicate()
         folder.cleanup()
 

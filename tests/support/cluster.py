@@ -1,4 +1,7 @@
-"""A Dask scheduler with workers, as another command would start them."""
+"""A Dask scheduler with workers, as another command would start them.
+
+`cluster` is one for the whole session: campaigns that neither start nor lose workers are computed there.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,14 @@ import os
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
+import pytest
 from harness import warm
 
 from support.places import TESTS
 
+ADDRESS = pytest.StashKey[str]()
 DASK = "from dask.cli import run_cli; run_cli()"
 
 
@@ -28,7 +33,8 @@ def started_cluster(address: str = "", *options: str, workers: int = 2) -> Itera
     address = address or f"tcp://127.0.0.1:{free_port()}"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), *filter(None, sys.path)])}
     place = ("--host", "127.0.0.1", "--port", address.rpartition(":")[2])
-    commands = [("scheduler", *place, "--no-dashboard", *options)]
+    # it ends by itself where the tests are killed
+    commands = [("scheduler", *place, "--no-dashboard", "--idle-timeout", "1 hour", *options)]
     commands += [("worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *options)] * workers
     processes = [
         warm.start(DASK, *command, env=environment, stdout=warm.DEVNULL, stderr=warm.DEVNULL)
@@ -40,3 +46,25 @@ def started_cluster(address: str = "", *options: str, workers: int = 2) -> Itera
         for process in processes:
             process.kill()
             process.wait()
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
+    """Keep one cluster for all tests that ask for it; workers of tests are forked when it is there."""
+    with ExitStack() as stack:
+        if not session.config.option.collectonly and any(
+            "cluster" in _fixtures(item) for item in session.items
+        ):
+            warm.wait_for_server()
+            session.config.stash[ADDRESS] = stack.enter_context(started_cluster())
+        return (yield)
+
+
+def _fixtures(item: pytest.Item) -> list[str]:
+    return getattr(item, "fixturenames", [])
+
+
+@pytest.fixture(scope="session")
+def cluster(pytestconfig: pytest.Config) -> str:
+    """Return the address of a scheduler with two workers, which stay."""
+    return pytestconfig.stash[ADDRESS]

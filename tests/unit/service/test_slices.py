@@ -108,10 +108,10 @@ def test_a_point_of_a_path_is_simulated_from_where_the_one_before_ended(file: Pa
         simulated(file.parent / "scene.toml", file.parent, 80)
 
 
-def test_a_point_of_a_later_round_is_simulated_from_where_it_began(tmp_path: Path) -> None:
+def test_a_point_of_a_later_round_is_simulated_from_where_it_began(tmp_path: Path, cluster: str) -> None:
     adaptive = 'points = 9, path = "up-down", adaptive = { tolerance = 0.001, at_most = 200 } }'
     text = SCENE.replace('points = 20, path = "up-down" }', adaptive)
-    run_campaign(vi.Scene.from_text(text), tmp_path / "campaign", workers=1)
+    run_campaign(vi.Scene.from_text(text), tmp_path / "campaign", scheduler=cluster)
     scene = tmp_path / "scene.toml"
     scene.write_text(text, encoding="utf-8")
     with vi.open_dataset(tmp_path / "campaign") as dataset:

@@ -236,12 +236,14 @@ def test_noise_and_conversion_are_those_of_their_tables(tmp_path: Path) -> None:
     assert found.load_cell.attrs["noise_seed"] == 3
 
 
-def test_a_seed_gives_the_same_noise_on_every_worker_and_each_run_its_own(tmp_path: Path) -> None:
+def test_a_seed_gives_the_same_noise_on_every_worker_and_each_run_its_own(
+    tmp_path: Path, cluster: str
+) -> None:
     tables = (SENSOR, EXCITER, CELL, DAQ, NOISE)
     swept = '[sweep]\n"forcing.amplitude" = { start = 2.9, stop = 3.0, points = 3, path = "up-down" }\n'
     given = scene(*tables, swept, variables=CHANNELS)
     run_scene(given, tmp_path / "run.nc")
-    run_campaign(given, tmp_path / "two", workers=2)
+    run_campaign(given, tmp_path / "two", scheduler=cluster)
     two, alone = open_dataset(tmp_path / "two"), open_dataset(tmp_path / "run.nc")
     for name in ("sensor_displacement", "load_cell", "drive"):
         np.testing.assert_array_equal(two[name].values, alone[name].values)

@@ -178,14 +178,15 @@ def test_run_with_set_leaves_what_was_run_in_the_dataset(tmp_path: Path) -> None
     assert "holds something else" in other.stderr
 
 
-def test_a_campaign_with_another_set_is_told_what_changed(tmp_path: Path) -> None:
+def test_a_campaign_with_another_set_is_told_what_changed(tmp_path: Path, cluster: str) -> None:
     scene = tmp_path / "sweep.toml"
     scene.write_text(frequency_text(3))
     folder, restitution = tmp_path / "campaign", "stop[1].restitution="
-    first = in_this_process("campaign", scene, "-o", folder, "--workers", "1", "--set", f"{restitution}0.8")
+    campaign = ("campaign", scene, "-o", folder, "--scheduler", cluster)
+    first = in_this_process(*campaign, "--set", f"{restitution}0.8")
     assert first.returncode == 0, first.stderr
-    other = in_this_process("campaign", scene, "-o", folder, "--workers", "1", "--set", f"{restitution}0.9")
+    other = in_this_process(*campaign, "--set", f"{restitution}0.9")
     assert other.returncode == 2
     assert "stop[1].restitution was 0.8, is 0.9" in other.stderr
-    again = in_this_process("campaign", scene, "-o", folder, "--set", f"{restitution}0.80")
+    again = in_this_process(*campaign, "--set", f"{restitution}0.80")
     assert "Nothing to do" in again.stdout

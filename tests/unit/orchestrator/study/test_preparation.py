@@ -59,9 +59,9 @@ def test_the_fewest_modes_that_meet_a_tolerance_are_found(tolerance: float) -> N
     assert int(found.found["modes_checked_with"]) > found.body.size
 
 
-def test_what_was_found_is_in_the_dataset_and_the_same_each_time(tmp_path: Path) -> None:
+def test_what_was_found_is_in_the_dataset_and_the_same_each_time(tmp_path: Path, cluster: str) -> None:
     scene = strip()
-    first, again = vi.run(scene), vi.campaign(scene, tmp_path / "campaign", workers=1, progress=False)
+    first, again = vi.run(scene), vi.campaign(scene, tmp_path / "campaign", scheduler=cluster, progress=False)
     for name in ("modes_found", "modes_checked_with", "estimated_error", "modes_tried", "tolerance"):
         assert first.attrs[name] == again.attrs[name]
     assert first.attrs["estimated_error"] <= 1e-3
@@ -103,11 +103,11 @@ def test_a_resonance_between_the_ends_of_a_sweep_decides() -> None:
     assert max(alone.values()) > 2e-2  # the ends alone would not have done
 
 
-def test_the_modes_of_a_sweep_follow_from_the_scene_alone(tmp_path: Path) -> None:
+def test_the_modes_of_a_sweep_follow_from_the_scene_alone(tmp_path: Path, cluster: str) -> None:
     small = resonance(7)
     assert prepared_scene(small).found == prepared_scene(small).found
-    first = vi.campaign(small, tmp_path / "campaign", workers=1, progress=False)
-    again = vi.campaign(small, tmp_path / "campaign", workers=1, progress=False)
+    first = vi.campaign(small, tmp_path / "campaign", scheduler=cluster, progress=False)
+    again = vi.campaign(small, tmp_path / "campaign", scheduler=cluster, progress=False)
     assert first.attrs["modes_checked_points"] == 7  # all that there are
     assert first.identical(again)
 
