@@ -15,6 +15,7 @@ import zipfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
+from xml.etree.ElementTree import Element
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import FileState, file_state, is_settled
@@ -268,10 +269,23 @@ def _sweep(cache: Path) -> None:
             shutil.rmtree(left, ignore_errors=True)
 
 
+def _description(path: Path, folder: Path) -> Element:
+    return root_of((folder / "modelDescription.xml").read_bytes(), f"{path}: modelDescription.xml")
+
+
+@lru_cache(maxsize=16)
+def value_references(fmu: UnpackedFmu) -> dict[str, int]:
+    """Return the value reference of each variable of an FMU of this package, whose description is known to be valid."""
+    return {
+        one.get("name", ""): int(one.get("valueReference", ""))
+        for one in _description(fmu.source, fmu.folder).iterfind("ModelVariables/*")
+    }
+
+
 @lru_cache(maxsize=64)
 def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
     """Return what the description of an FMU says of it; the digest stands for its contents, which are read once."""
-    root = root_of((folder / "modelDescription.xml").read_bytes(), f"{path}: modelDescription.xml")
+    root = _description(path, folder)
     version = root.get("fmiVersion", "")
     token = root.get("guid") if version == "2.0" else root.get("instantiationToken")
     identifiers = tuple(e.get("modelIdentifier", "") for tag in INTERFACES for e in root.findall(tag))

@@ -8,16 +8,19 @@ from contextlib import contextmanager
 from ctypes import c_void_p
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
-from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable, read_description
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.specification import ComponentSpec
+
+if TYPE_CHECKING:
+    from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable
 
 #: FMI types by the kind of call that moves them in FMI 3.0; FMI 2.0's names are translated.
 KINDS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Int64"}
@@ -28,6 +31,9 @@ Value = float | int | bool | str
 @lru_cache(maxsize=64)
 def description_of(fmu: Path) -> ModelDescription:
     """Return the description of an FMU file, read once for each process."""
+    # what drives our bodies alone needs neither a description nor FMPy
+    from vibroimpact.fmus.packaging.fmpy_door import read_description
+
     return read_description(fmu)
 
 

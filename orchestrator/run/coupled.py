@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus import fmu_path
+from vibroimpact.fmus.packaging.archive import unpack, value_references
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
-from vibroimpact.orchestrator.importer.component import Value, description_of
+from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.events import Event, LateEvents
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
@@ -68,7 +69,7 @@ def stop_of(k: int, integers: Mapping[str, int], version: str = "3.0") -> Compon
 
 def stop_parameters(stops: int, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:
     """Return the parameters of the stops, with the names of the body's parameters that they come from."""
-    known = {v.name for v in description_of(fmu_path("ImpactStop")).modelVariables}
+    known = value_references(unpack(fmu_path("ImpactStop")))
     return {
         (stop_name(k), name): f"contact[{k}].{name}"
         for k in range(1, stops + 1)

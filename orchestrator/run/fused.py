@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import runs, stepping
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.archive import unpack, value_references
 from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
-from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.run.record import (
     ROW_CAPACITY,
     ROW_WIDTH,
@@ -67,9 +66,8 @@ class BodyDriver(RecordedBody):
         *,
         wrap: WrapOf | None = None,
     ) -> None:
-        path = fmu_path(body, "3.0")
-        self.fmu = unpack(path)
-        self.references = {v.name: v.valueReference for v in description_of(path).modelVariables}
+        self.fmu = unpack(fmu_path(body, "3.0"))
+        self.references = value_references(self.fmu)
         self.instance = Instance3(self.fmu, "body", early_return=True, wrap=wrap and wrap("body"))
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))

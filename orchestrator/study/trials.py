@@ -13,7 +13,6 @@ import numpy as np
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.packaging.fmpy_door import integrated
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
@@ -151,6 +150,8 @@ class ModelExchangeTrial:
 
     def run(self) -> Observation:
         """Simulate the scene once."""
+        from vibroimpact.fmus.packaging.fmpy_door import integrated
+
         began, scene = time.perf_counter(), self._scene
         begin, end = recorded_window(scene, self._floats)
         limit = math.inf if scene.execution.deadline is None else began + scene.execution.deadline

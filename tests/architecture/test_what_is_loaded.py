@@ -25,6 +25,7 @@ HEAVY = (
     "dask",
     "distributed",
     "fastapi",
+    "fmpy",
     "grpc",
     "httpx",
     "matplotlib",
@@ -89,14 +90,14 @@ OTHERS: Rows = {
     "replay scene.toml signal.nc -o replayed.nc": ("", 2),
     "orbit scene.toml --impacts 1": ("", 0),
     "control scene.toml --from 0.9 --to 0.89 --step 0": ("", 2),
-    "fmu check body.fmu": ("", 0),
-    "ssp export two_oscillators.toml -o two.ssp": ("", 0),
-    "ssp import two.ssp -o imported.toml": ("", 0),
+    "fmu check body.fmu": ("fmpy", 0),
+    "ssp export two_oscillators.toml -o two.ssp": ("fmpy", 0),
+    "ssp import two.ssp -o imported.toml": ("fmpy", 0),
     "classify swept.nc": ("dask", 0),
     "run drawn.toml -o drawn.nc": ("scipy", 0),
     "follow scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9": ("scipy", 0),
     # the names of connections are labels
-    "run two_oscillators.toml -o two.nc": (ASKED, 0),
+    "run two_oscillators.toml -o two.nc": (f"{ASKED} fmpy", 0),
     "sensitivity drawn.nc": (ASKED, 0),
     "hard-cases --only grazing-from-below": (ASKED, 0),
     "import signal.csv --rate 100 --unit m -o signal.nc": (ASKED, 0),
@@ -128,13 +129,14 @@ OTHERS: Rows = {
     "rig recover absent.journal": ("grpc nidaqmx", 2),
     "rig sine --output Dev1/ao0 --frequency 5 --amplitude 99": ("grpc nidaqmx", 2),
     "rig sweep sweep.toml -o rig_sweep --dry-run": (f"{ASKED} grpc matplotlib nidaqmx", 0),
-    "serve --data served --host 192.0.2.1": ("dask distributed fastapi matplotlib uvicorn", 2),
+    "serve --data served --host 192.0.2.1": ("dask distributed fastapi fmpy matplotlib uvicorn", 2),
 }
 """All other commands, with what they may load of `HEAVY`, and their exit code."""
 NAMES = {
     "campaign": "dask distributed",
     "figures": "matplotlib",
     "draw": "matplotlib",
+    **dict.fromkeys(("export_fmu", "export_ssp", "import_ssp"), "fmpy"),
     **dict.fromkeys(("drive_sine", "record", "record_spikes", "recover"), "grpc nidaqmx"),
 }
 """Names of `vi` that load something of `HEAVY`, and what; all others load nothing of it."""
