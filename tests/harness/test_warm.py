@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from harness import warm
@@ -88,3 +89,27 @@ def test_a_signal_reaches_it_alone() -> None:
     assert second.wait(30) == -signal.SIGKILL
     for process in (first, second):
         process.communicate()
+
+
+def test_nothing_stays_where_the_tests_are_killed() -> None:
+    program = "from harness import warm; warm.start_server(); warm.wait_for_server(); "
+    program += "print(warm.start('import time; time.sleep(600)', stdout=warm.DEVNULL).pid, flush=True); "
+    program += "import os; os.kill(os.getpid(), 9)"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(warm.TESTS)},
+    )
+    assert done.returncode == -signal.SIGKILL
+    sleeper, end = int(done.stdout), time.monotonic() + 60.0
+    while _lives(sleeper) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not _lives(sleeper)
+
+
+def _lives(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False

@@ -89,8 +89,15 @@ class _Server:
                 elif key.fd == self._child_ended:
                     os.read(self._child_ended, 4096)
                 elif not os.read(0, 1):
-                    os._exit(0)
+                    self._end()
             self._reap()
+
+    def _end(self) -> NoReturn:
+        """End this process, and what copies were left by tests that were killed."""
+        for pid in self._connections:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(pid, signal.SIGKILL)
+        os._exit(0)
 
     def _accept(self) -> str | None:
         connection, _ = self._listener.accept()
