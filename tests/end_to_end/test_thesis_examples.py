@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 from support.places import EXAMPLES, ROOT
 from support.reference_bodies import beam_shape, period_one_orbits, uniform_chain
 
+from vibroimpact import find_orbits
 from vibroimpact.analysis import figures, open_dataset
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import load_scene
@@ -75,6 +76,7 @@ def distinct(phases: np.ndarray) -> int:
         ("figure_2_4b", (1, 2)),
         ("figure_2_4c", (2, 2)),
         ("figure_2_4d", (4, 4)),
+        ("figure_4_5", (1, 1)),
         ("figure_6_5c", (4, 1)),
         ("figure_6_5d", (2, 1)),
         ("figure_6_6a", (1, 1)),
@@ -83,6 +85,7 @@ def distinct(phases: np.ndarray) -> int:
         ("figure_6_6d", (1, 2)),
         ("figure_6_13", (1, 1)),
         ("figure_6_15", (1, 1)),
+        ("figure_7_8a", (2, 2)),
         ("figure_7_11", (1, 1)),
         ("stiff_beam", (5, 1)),
     ],
@@ -114,6 +117,15 @@ def test_the_motion_of_figure_2_8_is_not_periodic_and_its_impacts_in_figure_2_11
     plane = np.stack([hits.impact_phase.values / (2.0 * math.pi), hits.impact_velocity.values])
     filled = [len(np.unique((plane * boxes).astype(int), axis=1).T) for boxes in (25, 100)]
     assert filled[1] / filled[0] < 4.0**1.6
+
+
+def test_figure_4_5_has_not_the_printed_velocity_and_would_with_another_restitution(run) -> None:
+    hits = run("figure_4_5").vibroimpact.impacts()
+    np.testing.assert_allclose(hits.impact_velocity, 0.2387618088, rtol=1e-9)
+    np.testing.assert_allclose(hits.impact_phase, 1.22923309, rtol=1e-8)
+    other = load_scene(FOLDER / "figure_4_5.toml").with_values({"stop[1].restitution": 0.892})
+    (orbit,) = find_orbits(other, 1)
+    assert orbit.velocities[0] == pytest.approx(0.2269101, rel=5e-4)
 
 
 def test_figure_3_3_has_its_grazings_its_period_doubling_and_its_fold(run) -> None:
