@@ -7,6 +7,8 @@ import pytest
 from support.component_fmu import LOWER, VERSIONS, OscillatorFmu, stop
 from support.tolerance import ROUNDING, SEQUENCE
 
+from vibroimpact import Scene, run
+
 GRAVITY = 2.0
 FALL = {"stiffness": 0.0, "forcing.amplitude": -GRAVITY}
 
@@ -136,3 +138,24 @@ def test_a_dead_stop_at_the_equilibrium_holds_the_mass_without_pressing_it(k: fl
         assert count == 1
         assert grazes <= 2
         assert abs(o.get("displacement") - position) <= ROUNDING
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-10])
+def test_contact_tolerance_bounds_the_speed_after_one_contact_and_errors_add_up(tolerance: float) -> None:
+    scene = Scene.from_dict(
+        {
+            "scene": {"units": "nondimensional"},
+            "body": {"mass": 1.0, "stiffness": 0.0, "displacement_start": -1.0},
+            "forcing": {"amplitude": 1.0, "angular_frequency": 0.0},
+            "stop": [{"position": 0.0, "law": "hertz", "stiffness": 1e4}],
+            "record": {"recorded_time": 41.0},
+            "execution": {"contact_tolerance": tolerance, "how": "fused"},
+        }
+    )
+    # nothing is lost: each touch-down has the speed of the first
+    speeds = run(scene, progress=False).impact_velocity.values
+    assert speeds[0] == pytest.approx(math.sqrt(2.0), rel=ROUNDING)
+    assert len(speeds) == 14
+    errors = np.abs(speeds / math.sqrt(2.0) - 1.0) / tolerance
+    assert 0.5 < errors[1] < 2.5
+    assert 14.0 < errors[-1] < 30.0
