@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -71,6 +73,20 @@ def test_the_end_of_one_that_ends_at_once_is_not_lost(monkeypatch: pytest.Monkey
         return line(copy)
 
     monkeypatch.setattr(warm.Copy, "_line", late)
+    assert warm.run("pass").returncode == 0
+
+
+def test_one_that_has_ended_before_its_request_is_seen_to_be_sent_is_no_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    send = socket.send_fds
+
+    def late(*given: Any) -> int:
+        sent = send(*given)
+        time.sleep(0.5)
+        return sent
+
+    monkeypatch.setattr(socket, "send_fds", late)
     assert warm.run("pass").returncode == 0
 
 

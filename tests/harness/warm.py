@@ -179,7 +179,9 @@ class Copy:
             self._connection.connect(str(Path(_server[1].name, "socket")))
             data = json.dumps(asked).encode() + b"\n"
             sent = socket.send_fds(self._connection, [data], [given, out, err])
-            self._connection.sendall(data[sent:])
+            # a copy may have ended by now: to send nothing would be an error
+            if sent < len(data):
+                self._connection.sendall(data[sent:])
             self.pid = int(self._line())
 
     def _line(self) -> bytes:
