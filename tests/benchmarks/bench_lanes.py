@@ -34,6 +34,13 @@ from vibroimpact.fmus.core import lanes
 from vibroimpact.fmus.core.lanes import Instructions, instructions
 
 POINTS = 64
+SETS = {
+    "strobe of all periods": ("periods",),
+    "impacts of all periods": ("impacts",),
+    "strobe and extremes of all periods": ("periods", "extrema"),
+    "all of all periods": ("periods", "impacts", "extrema"),
+}
+"""What is recorded, by its name."""
 OTHER_IMPACTS = 100
 """Of diffrax and FMPy, one in each period: their time per impact does not depend on their number."""
 HERE = [each for each in Instructions if each and instructions() >= each]
@@ -64,14 +71,13 @@ class Case:
 
     points: Columns
     impacts: float
-    is_recorded: bool = False
+    recorded: tuple[str, ...] = ("periods",)
 
     def seconds(self, clock: Clock, chosen: Instructions) -> float:
         """Return seconds per impact."""
         clock.seconds = 0.0
-        run(
-            self.points, impacts=self.is_recorded, extrema=self.is_recorded, instructions=chosen, room=100_000
-        )
+        recorded = {name: name in self.recorded for name in ("periods", "impacts", "extrema")}
+        run(self.points, **recorded, instructions=chosen, room=100_000)
         return clock.seconds / self.impacts
 
 
@@ -92,13 +98,13 @@ def periodic(periods: int, recorded: int = 1) -> Columns:
     return oscillators(periods, recorded, start_p=0.0, **body)
 
 
-def counted(points: Columns, *, is_recorded: bool = False) -> Case:
+def counted(points: Columns, *recorded: str) -> Case:
     """Return those of the points that run in lanes, with how often they are hit."""
     whole = {**points, "begin": np.zeros_like(points["begin"])}
     found = run(whole, extrema=False, periods=False, room=1_000_000)
     kept = np.flatnonzero(found.has_run)
     impacts = sum(float(np.count_nonzero(found.rows[place][:, 0] == IMPACT)) for place in kept)
-    return Case(taken(points, kept), impacts, is_recorded)
+    return Case(taken(points, kept), impacts, recorded or ("periods",))
 
 
 class Other:
@@ -143,7 +149,10 @@ def cases(periods: int) -> dict[str, Case]:
     found = {
         "P(1,1)": counted(periodic(periods)),
         "P(1,1), 8 points": counted(taken(periodic(periods), np.arange(8))),
-        "P(1,1), all periods recorded": counted(periodic(0, min(periods, 500)), is_recorded=True),
+        **{
+            f"P(1,1), {what}": counted(periodic(0, min(periods, 500)), *recorded)
+            for what, recorded in SETS.items()
+        },
         "chaos": counted(oscillators(periods // 10, 1, start_p=0.1, **chaos)),
     }
     for modes, contacts in ((1, 1), (1, 2), (2, 1), (4, 1), (8, 1), (8, 2)):
