@@ -3,6 +3,7 @@
 - Records: the motion of `examples/single_run.toml`, 4,000 periods of it, with each record in turns. Processor time,
   medians of repetitions and their range, over that of the run which records nothing. A time series costs its samples:
   the time of one sample is told too, at two rates.
+- Points in lanes: what a recorded period of P(1,1) adds through `vi.run`, by the slope between two lengths of a record.
 - Examples: calls of the functions of FMUs, and bytes of the dataset, of one point of each example scene. They are
   counts, the same on each machine.
 
@@ -35,6 +36,15 @@ RECORDS: dict[str, dict[str, Any]] = {
     "10 samples a period": {"impacts": False, "extrema": False, "strobe": False, "samples": 10},
     "40 samples a period": {"impacts": False, "extrema": False, "strobe": False, "samples": 40},
 }
+LANES = {
+    "scene": {"units": "nondimensional"},
+    "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
+    "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
+    "stop": [{"position": 1.0, "restitution": 0.7}],
+    "sweep": {"body.displacement_start": {"start": 0.2, "stop": 0.9, "points": 64}},
+}
+LENGTHS = (200, 2200)
+"""Recorded periods of the two runs whose difference is taken."""
 
 
 def scene_of(record: dict[str, Any]) -> Scene:
@@ -64,6 +74,24 @@ def seconds_of_records(repetitions: int) -> dict[str, list[float]]:
     for runner in runners.values():
         runner.close()
     return found
+
+
+def slopes_in_lanes(repetitions: int) -> dict[str, float]:
+    """Return the processor time of a recorded period of a point in lanes, us, of each set of records."""
+    sets = {name: record for name, record in RECORDS.items() if "samples" not in record}
+    sets["strobe"] = {**RECORDS["nothing"], "strobe": True}
+    found: dict[str, list[float]] = {name: [] for name in sets}
+    for _ in range(repetitions):
+        for name, record in sets.items():
+            seconds = []
+            for periods in LENGTHS:
+                lengths = {"transient_periods": 200, "recorded_periods": periods}
+                scene = Scene.from_dict({**LANES, "record": {**lengths, **record}})
+                began = time.process_time()
+                vi.run(scene, progress=False)
+                seconds.append(time.process_time() - began)
+            found[name].append((seconds[1] - seconds[0]) / ((LENGTHS[1] - LENGTHS[0]) * 64))
+    return {name: 1e6 * statistics.median(each) for name, each in found.items()}
 
 
 def counts_of(path: Path, folder: Path) -> tuple[int, int]:
@@ -96,6 +124,9 @@ def main() -> None:
         line = f"  {name:20} {middle / bare:8.2f}  ({min(seconds) / bare:.2f} to {max(seconds) / bare:.2f})"
         samples = RECORDS[name].get("samples", 0) * PERIODS
         print(line + (f"  {(middle - bare) / samples * 1e6:.2f} us a sample" if samples else ""))
+    print("A recorded period of P(1,1) in lanes, through vi.run, us")
+    for name, slope in slopes_in_lanes(repetitions).items():
+        print(f"  {name:20} {slope:8.3f}")
     print("One point of each example: calls of functions of FMUs, bytes of the dataset")
     with tempfile.TemporaryDirectory() as folder:
         for path in sorted(EXAMPLES.glob("*.toml")):
