@@ -186,7 +186,7 @@ def _errors(magnitude: Floats, found: FrequencyResponse) -> Floats:
     unbiased = found.averages / (found.averages - 1.0)
     variance = unbiased * (magnitude * found.relative_error) ** 2
     # geometric: leakage errs by a share of the response, which changes fast about its peak
-    return np.exp(0.5 * uniform_filter1d(np.log(np.maximum(variance, 1e-300)), _NEIGHBOURS))
+    return np.asarray(np.exp(0.5 * uniform_filter1d(np.log(np.maximum(variance, 1e-300)), _NEIGHBOURS)))
 
 
 def _form_of(units: tuple[str, str]) -> str:
@@ -262,7 +262,7 @@ def _model(curve: Curve, p: Floats) -> Floats | Complexes:
     """Return what the lines show of a resonance: its frequency, damping ratio, C and R."""
     omega, seen = curve.angular_frequency, curve.leakage.seen
     if not curve.complex:
-        return np.abs(seen(lambda at: p[2] * _shape(at, p[0], p[1], curve.form), omega) + p[3])
+        return np.asarray(np.abs(seen(lambda at: p[2] * _shape(at, p[0], p[1], curve.form), omega) + p[3]))
     constant, others = p[2] + 1j * p[3], p[4] + 1j * p[5]
 
     def response(at: Floats) -> Complexes:
