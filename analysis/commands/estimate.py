@@ -142,6 +142,7 @@ def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> x
 
 
 def _shown_response(console: Terminal, found: ResponseEstimates) -> xr.Dataset:
+    console.print(found.resonance.verdict, soft_wrap=True)
     print_estimates(console, found.title, found.estimates())
     print_remarks(console, found.words())
     return found.dataset()

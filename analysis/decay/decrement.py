@@ -112,8 +112,14 @@ def logarithmic_decrement(samples: DecaySamples) -> Decrement:
         peaks,
         float(-2.0 * curve[1]),
         float(-2.0 * (curve[1] + 2.0 * curve[2] * number[-1])),
-        bool(abs(curve[2]) > _BENT * bends[2]) or not residual_test(off_line, 1.0, _LAGS_TURN).adequate,
+        bool(abs(curve[2]) > _BENT * bends[2]) or _wanders(off_line),
     )
+
+
+def _wanders(off_line: Floats) -> bool:
+    """Tell whether what a line leaves is no noise; sides that alternate are an error of the equilibrium, no bend."""
+    alternates = np.mean(np.diff(off_line, 2) ** 2) >= 6.0 * np.mean(off_line**2)
+    return bool(not alternates and not residual_test(off_line, 1.0, _LAGS_TURN).adequate)
 
 
 def _weighted(number: Floats, value: Floats, weight: Floats, degree: int) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import xarray as xr
@@ -53,6 +53,29 @@ class Estimate:
 
         half = float(student.ppf(0.5 + CONFIDENCE / 2, self.degrees_of_freedom)) * self.standard_error
         return self.value - half, self.value + half
+
+
+def verdict_of(doubts: Sequence[str]) -> str:
+    """Return in one line whether estimates are to be relied on, and why not.
+
+    >>> verdict_of([]), verdict_of(["the record is short"])
+    ('sure.', 'not sure, because the record is short.')
+    """
+    return f"not sure, because {'; '.join(doubts)}." if doubts else "sure."
+
+
+def verdict_by_method(doubts: Mapping[str, Sequence[str]]) -> str:
+    """Return in one line which methods are to be relied on, which are not, and why not, from the doubts of each.
+
+    >>> verdict_by_method({"decrement": ["it is bent"], "law": []})
+    'sure of best damping law; not sure of logarithmic decrement, because it is bent.'
+    """
+    sure = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if not reasons)
+    unsure = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if reasons)
+    reasons = list(dict.fromkeys(reason for several in doubts.values() for reason in several))
+    if not sure or not unsure:
+        return f"sure of {sure}." if sure else verdict_of(reasons)
+    return f"sure of {sure}; not sure of {unsure}, because {'; '.join(reasons)}."
 
 
 def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:

@@ -60,7 +60,7 @@ def first_guess(samples: DecaySamples) -> FirstGuess:
     EstimationError
         Fewer than two periods are in the window, or nothing oscillates.
     """
-    omega = _spectral_peak(samples)
+    omega = spectral_peak(samples)
     length = float(samples.time[-1] - samples.time[0])
     if omega * length < FEWEST_PERIODS * 2.0 * np.pi:
         raise EstimationError(
@@ -80,8 +80,14 @@ def first_guess(samples: DecaySamples) -> FirstGuess:
     return FirstGuess(omega, decay_rate, float(np.median(envelope.offset)), envelope)
 
 
-def _spectral_peak(samples: DecaySamples) -> float:
-    """Return the angular frequency (rad/s) of the highest peak of the spectrum."""
+def spectral_peak(samples: DecaySamples) -> float:
+    """Return the angular frequency (rad/s) of the highest peak of the spectrum.
+
+    Raises
+    ------
+    EstimationError
+        The samples are a straight line.
+    """
     count = min(len(samples.time), _MOST_GRID)
     grid = np.linspace(samples.time[0], samples.time[-1], count)
     value = np.interp(grid, samples.time, samples.value)
@@ -161,6 +167,11 @@ class ExponentialDecay:
     fitted: Floats
     test: ResidualTest
 
+    @property
+    def aic(self) -> float:
+        """Akaike's criterion for white residuals: five parameters and the variance."""
+        return len(self.fitted) * float(np.log(max(self.test.rms**2, 1e-300))) + 12.0
+
 
 def fit_exponential(samples: DecaySamples, guess: FirstGuess | None = None) -> ExponentialDecay:
     """Fit a decaying cosine by least squares.
@@ -211,6 +222,14 @@ def _refuse_nothing(samples: DecaySamples, found: OptimizeResult) -> None:
             f"{samples.name}: expected an oscillation, got one that explains {100 * max(explained, 0.0):.2g} % of the "
             "variance. Choose another window or channel."
         )
+
+
+def decaying_cosine(parameters: Floats, time: Floats) -> tuple[Floats, Floats]:
+    """Return a decaying cosine and its derivatives by its parameters, shapes (sample,) and (sample, 5).
+
+    The parameters are the amplitudes of cosine and sine, angular frequency (rad/s), decay rate (1/s) and offset.
+    """
+    return _model(parameters, time), _derivatives(parameters, time)
 
 
 def _model(parameters: Floats, time: Floats) -> Floats:

@@ -18,11 +18,14 @@ from vibroimpact.analysis.decay.estimate import (
     print_estimates,
     print_remarks,
     table_of,
+    verdict_by_method,
 )
 from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
 from vibroimpact.analysis.decay.law_fit import CUBIC, LawChoice, LawFit, choose_law
 from vibroimpact.analysis.decay.laws import ALL_LAWS, TERMS, VISCOUS, DampingLaw, spoken
+from vibroimpact.analysis.decay.residuals import ResidualTest
 from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
+from vibroimpact.analysis.decay.second_oscillation import SecondOscillation, second_oscillation
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
@@ -46,6 +49,33 @@ class FreeDecay:
     choice: LawChoice | None = None
     backbone: Backbone | None = None
     refusals: Mapping[str, str] = field(default_factory=dict)
+    second: SecondOscillation | None = None
+
+    @property
+    def law(self) -> LawFit | None:
+        """The best damping law; None where a second oscillation explains the motion better."""
+        return self.choice.best if self.choice is not None and self.second is None else None
+
+    def doubts(self) -> dict[str, list[str]]:
+        """Return why the estimates are not to be relied on, by method; each a part of a sentence."""
+        common = [self.second.words] if self.second is not None else []
+        if self.exponential.decay_rate.interval[0] <= 0.0:
+            common.append("the motion does not decay by more than its error")
+        found = {}
+        misfit = _misfit("a decaying cosine", self.exponential.test) if self.second is None else []
+        if self.decrement is not None:
+            bent = ["the logarithm of the peaks is not a straight line"] if self.decrement.bent else []
+            found["decrement"] = common + (bent or misfit)
+        found["exponential"] = common + misfit
+        if self.law is not None:
+            negative = [] if self.law.physical else ["a coefficient of the law is negative"]
+            found["law"] = common + negative + _misfit(spoken(self.law.law), self.law.test)
+        return found
+
+    @property
+    def verdict(self) -> str:
+        """Whether the estimates are to be relied on, in one line: of which methods, and why not of the others."""
+        return verdict_by_method(self.doubts())
 
     def estimates(self) -> dict[str, dict[str, Estimate]]:
         """Return the estimates by method, then quantity."""
@@ -61,8 +91,8 @@ class FreeDecay:
             *("natural_angular_frequency", "damping_ratio"),
         )
         found["exponential"] = {name: getattr(self.exponential, name) for name in quantities}
-        if self.choice is not None:
-            found["law"] = law_estimates(self.choice.best)
+        if self.law is not None:
+            found["law"] = law_estimates(self.law)
         return found
 
     def words(self) -> tuple[str, ...]:
@@ -79,7 +109,11 @@ class FreeDecay:
                 f"the logarithm of the peaks is not a straight line (decrement about {self.decrement.first:.3g} at "
                 f"first, {self.decrement.last:.3g} at last): the damping is not viscous alone."
             )
-        if self.choice is not None:
+        if self.second is not None:
+            said.append(
+                f"{self.second.words}. Two decaying cosines describe the motion, and no damping law is chosen."
+            )
+        elif self.choice is not None:
             said += self.choice.words()
         if self.backbone is not None:
             said.append(self.backbone.words(self.samples.unit))
@@ -99,7 +133,8 @@ class FreeDecay:
             estimates="decay",
             channel=self.samples.name,
             reference_time=self.samples.reference_time,
-            best_law="" if self.choice is None else self.choice.best.law.name,
+            best_law="" if self.law is None else self.law.law.name,
+            verdict=self.verdict,
             remarks="\n".join(self.words()),
         )
 
@@ -140,14 +175,23 @@ def estimate_decay(
             refusals[method] = str(problem)
             return None
 
-    return FreeDecay(
-        samples,
-        exponential,
-        tried("decrement", lambda: logarithmic_decrement(samples)),
-        tried("law", lambda: choose_law(samples, laws, cubic=cubic, start=exponential)) if laws else None,
-        tried("backbone", lambda: backbone(samples, periods)),
-        refusals,
-    )
+    decrement = tried("decrement", lambda: logarithmic_decrement(samples))
+    choice = tried("law", lambda: choose_law(samples, laws, cubic=cubic, start=exponential)) if laws else None
+    best = exponential if choice is None else choice.best
+    second = None if best.test.adequate else second_oscillation(samples, exponential)
+    if second is not None and not second.better_than(best.aic):
+        second = None
+    windows = tried("backbone", lambda: backbone(samples, periods))
+    return FreeDecay(samples, exponential, decrement, choice, windows, refusals, second)
+
+
+def _misfit(what: str, test: ResidualTest) -> list[str]:
+    """Return the doubt that a fit leaves more than noise, where it does."""
+    if test.adequate:
+        return []
+    return [
+        f"{what} leaves more than noise ({100.0 * test.relative_structure:.2g} % of the largest excursion)"
+    ]
 
 
 def law_estimates(fit: LawFit) -> dict[str, Estimate]:
@@ -169,8 +213,8 @@ def _motion(decay: FreeDecay) -> xr.Dataset:
         "measured": ("time", samples.value, unit, f"measured {samples.name}"),
         "exponential_fit": ("time", decay.exponential.fitted, unit, "fitted decaying cosine"),
     }
-    if decay.choice is not None:
-        best = decay.choice.best
+    if decay.law is not None:
+        best = decay.law
         rows["law_fit"] = ("time", best.fitted, unit, f"motion under the fitted law: {spoken(best.law)}")
     return xr.Dataset(described(rows | {"time": ("time", samples.time, "s", "time")}))
 
@@ -238,7 +282,8 @@ def print_decay(console: Terminal, decay: FreeDecay) -> None:
     title = (
         f"Free decay of {decay.samples.name}{unit}, amplitude and phase at {decay.samples.reference_time:g} s"
     )
-    law = {} if decay.choice is None else {"law": spoken(decay.choice.best.law)}
+    console.print(decay.verdict, soft_wrap=True)
+    law = {} if decay.law is None else {"law": spoken(decay.law.law)}
     print_estimates(console, title, decay.estimates(), METHOD_WORDS | law)
     if decay.choice is not None:
         _print_laws(console, decay.choice, len(decay.samples.time))

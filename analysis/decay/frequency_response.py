@@ -6,19 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from vibroimpact.analysis.decay.samples import Floats, clock_remark, unit_power
+from vibroimpact.analysis.decay.leakage import NO_LEAKAGE, Leakage, leakage_of
+from vibroimpact.analysis.decay.samples import Complexes, Floats, clock_remark, unit_power
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import option
 
-Complexes = NDArray[np.complex128]
-
 WINDOWS = ("bartlett", "hann", "boxcar")
-_SEGMENTS = 8
+_SEGMENTS, _FEWEST_SEGMENTS = 8, 5
+"""Segments by default, and the fewest that longer segments leave: below, the coherence says too little."""
+_LINES = 4.0
+"""Lines in the half-power bandwidth of the highest peak, below which segments are made longer."""
 _SHORTEST = 16
+DRIVEN = 1e-3
+"""Drive of a line, relative to the largest, below which the line tells nothing of a response."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,10 @@ class FrequencyResponse:
         Independent segments; overlap counted as what it is worth.
     resolution : float
         Noise bandwidth of a line, Hz.
+    leakage : Leakage
+        What segments make of the response, at this drive.
+    common : float
+        Lines that are worth one, as the window makes errors of neighbours alike.
     phase_known : bool
         Whether both channels share a clock.
     units : tuple of str
@@ -55,6 +62,8 @@ class FrequencyResponse:
     phase_known: bool = True
     units: tuple[str, str] = ("1", "1")
     remarks: tuple[str, ...] = ()
+    leakage: Leakage = NO_LEAKAGE
+    common: float = 1.0
 
     @property
     def unit(self) -> str:
@@ -89,8 +98,9 @@ def frequency_response(
     drive, response : Channel or xarray.DataArray
         Evenly sampled. On different axes the response is taken at the instants of the drive.
     segment : int, optional
-        Samples of a segment; by default the power of two that gives eight segments or more. As many as there
-        are, or more: one segment of all samples, as a single transient wants it.
+        Samples of a segment; by default the power of two that gives eight segments or more, twice as many where
+        the highest peak has fewer than four lines in its half-power bandwidth and five segments remain. As many as
+        there are, or more: one segment of all samples, as a single transient wants it.
     window : {"bartlett", "hann", "boxcar"}
         `bartlett` is the periodic one: `1 - |j - M/2| / (M/2)`.
     start, stop : float, optional
@@ -101,20 +111,50 @@ def frequency_response(
     UsageError
         Unknown window, uneven sampling, or too few samples.
     """
-    from scipy.signal import csd, get_window, welch
-
     if window not in WINDOWS:
         raise UsageError(f'{option("window")}: expected one of {", ".join(WINDOWS)}, got "{window}".')
     drive, response = channel_of(drive), channel_of(response)
     x, y, interval, remarks = _pair(drive, response, start, stop)
     count = len(x)
-    if segment is None:
-        segment = 1 << max(int(np.log2(count / (0.5 * (_SEGMENTS + 1)))), 4)
-    segment = min(segment, count)
-    if segment < _SHORTEST:
+    automatic = 1 << max(int(np.log2(count / (0.5 * (_SEGMENTS + 1)))), 4)
+    chosen = min(automatic if segment is None else segment, count)
+    if chosen < _SHORTEST:
         raise UsageError(
-            f"{option('segment')}: expected {_SHORTEST} samples or more, got {segment}. Take longer segments."
+            f"{option('segment')}: expected {_SHORTEST} samples or more, got {chosen}. Take longer segments."
         )
+    known = (
+        drive.axis.trigger == response.axis.trigger,
+        (measured_unit(drive.unit).si, measured_unit(response.unit).si),
+    )
+    found = _averaged(x, y, interval, window, chosen, known, remarks)
+    if segment is None and _segments(count, 2 * chosen) >= _FEWEST_SEGMENTS and _narrow(found):
+        return _averaged(x, y, interval, window, 2 * chosen, known, remarks)
+    return found
+
+
+def _segments(count: int, segment: int) -> int:
+    return 1 + (count - segment) // (segment - segment // 2)
+
+
+def _narrow(found: FrequencyResponse) -> bool:
+    """Tell whether the highest peak of the driven lines has too few lines in its half-power bandwidth."""
+    magnitude = np.abs(found.h1) * (found.drive_power > DRIVEN)
+    low, high = half_power(found.frequency, magnitude)
+    return bool(high - low < _LINES * (found.frequency[1] - found.frequency[0]))
+
+
+def _averaged(
+    x: Floats,
+    y: Floats,
+    interval: float,
+    window: str,
+    segment: int,
+    known: tuple[bool, tuple[str, str]],
+    remarks: list[str],
+) -> FrequencyResponse:
+    """Return the response by segments of a length; `known`: whether the phase is, and the units."""
+    from scipy.signal import csd, get_window, welch
+
     shape = get_window(window, segment, fftbins=True)
     options = {"fs": 1.0 / interval, "window": shape, "noverlap": segment // 2, "detrend": False}
     frequency, xx = welch(x, **options)
@@ -123,9 +163,8 @@ def frequency_response(
     # Without the offset line; a line on which nothing was driven has no response.
     lines = (frequency > 0.0) & (xx > 0.0) & (yy > 0.0) & (np.abs(xy) > 0.0)
     frequency, xx, yy, xy = frequency[lines], xx[lines], yy[lines], xy[lines]
-    segments = 1 + (count - segment) // (segment - segment // 2)
-    if segments == 1:
-        remarks.append("one segment only: the coherence is 1 by construction and says nothing.")
+    segments = _segments(len(x), segment)
+    one = ["one segment only: the coherence is 1 by construction and says nothing."] if segments == 1 else []
     return FrequencyResponse(
         frequency,
         xy / xx,
@@ -134,10 +173,43 @@ def frequency_response(
         xx / float(np.max(xx)),
         _independent(shape, segments),
         float(np.sum(shape**2) / np.sum(shape) ** 2 / interval),
-        drive.axis.trigger == response.axis.trigger,
-        (measured_unit(drive.unit).si, measured_unit(response.unit).si),
-        tuple(remarks),
+        *known,
+        (*remarks, *one),
+        leakage_of(x, shape, interval, DRIVEN),
+        _common(shape),
     )
+
+
+def half_power(frequency: Floats, magnitude: Floats) -> tuple[float, float]:
+    """Return where the magnitude falls to its maximum over sqrt 2, on both sides; NaN where it does not."""
+    top = int(np.argmax(magnitude))
+    level = _highest(magnitude, top) / np.sqrt(2.0)
+    below = np.flatnonzero(magnitude < level)
+    left, right = below[below < top], below[below > top]
+
+    def crossing(low: int, high: int) -> float:
+        share = (level - magnitude[low]) / (magnitude[high] - magnitude[low])
+        return float(frequency[low] + share * (frequency[high] - frequency[low]))
+
+    return (
+        crossing(int(left[-1]), int(left[-1]) + 1) if len(left) else np.nan,
+        crossing(int(right[0]), int(right[0]) - 1) if len(right) else np.nan,
+    )
+
+
+def _highest(magnitude: Floats, top: int) -> float:
+    """Return the height of the parabola through the highest value and its neighbours."""
+    if not 0 < top < len(magnitude) - 1:
+        return float(magnitude[top])
+    before, here, after = magnitude[top - 1 : top + 2]
+    bend = before - 2.0 * here + after
+    return float(here - (after - before) ** 2 / (8.0 * bend)) if bend < 0.0 else float(here)
+
+
+def _common(shape: Floats) -> float:
+    """Return how many neighbouring lines are worth one: the sum of the squared correlations of their errors."""
+    spectrum = np.abs(np.fft.fft(shape**2)) / float(np.sum(shape**2))
+    return float(np.sum(spectrum**4))
 
 
 def _independent(shape: Floats, segments: int) -> float:

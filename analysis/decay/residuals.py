@@ -101,7 +101,11 @@ def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTe
     correlation = autocorrelation(residual, lags)
     statistic = count * (count + 2.0) * float(np.sum(correlation**2 / (count - np.arange(1, lags + 1))))
     variance = float(np.mean(residual**2))
-    floor = min(float(np.mean(np.diff(residual, 2) ** 2)) / 6.0, variance)
+    probability = float(chi2.sf(statistic, lags))
+    floor = float(np.mean(np.diff(residual, 2) ** 2)) / 6.0
+    if floor >= variance:
+        # faster than white noise, as a hum: second differences tell no noise from it
+        floor = variance if probability >= SIGNIFICANCE else 0.0
     structure = float(np.sqrt(variance - floor))
     return ResidualTest(
         rms=float(np.sqrt(variance)),
@@ -109,7 +113,7 @@ def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTe
         structure=structure,
         relative_structure=structure / excursion if excursion > 0.0 else 0.0,
         lags=lags,
-        portmanteau_probability=float(chi2.sf(statistic, lags)),
+        portmanteau_probability=probability,
         runs_probability=_runs_probability(residual),
         effective_samples=effective_samples(residual, turn),
     )

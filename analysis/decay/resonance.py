@@ -2,29 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import described
-from vibroimpact.analysis.decay.estimate import Estimate, table_of
-from vibroimpact.analysis.decay.frequency_response import Complexes, FrequencyResponse
-from vibroimpact.analysis.decay.residuals import coloured_covariance
-from vibroimpact.analysis.decay.samples import Floats
+from vibroimpact.analysis.decay.estimate import Estimate, table_of, verdict_of
+from vibroimpact.analysis.decay.frequency_response import DRIVEN, FrequencyResponse, half_power
+from vibroimpact.analysis.decay.leakage import NO_LEAKAGE, Leakage
+from vibroimpact.analysis.decay.residuals import coloured_covariance, residual_test
+from vibroimpact.analysis.decay.samples import Complexes, Floats
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.wording import option
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 FORMS = ("displacement", "velocity", "acceleration", "transmissibility")
 """What responds to what: the first three to a force, the last an absolute acceleration to that of the base."""
 
 _FEWEST_LINES = 8
-_DRIVEN = 1e-3
-"""Drive of a line, relative to the largest, below which it is not looked at for a peak."""
 _STANDS_OUT = 3.0
 """Modal constant, in standard errors, below which a peak may be a ripple of the noise."""
 _BAND = 8.0
 """Half-power bandwidths on either side of a peak that are fitted, unless a band is given."""
+_NEIGHBOURS = 5
+"""Lines over which the variance that the coherence gives is averaged."""
+_ROUNDING = 1e-12
+"""Distance of the coherence from 1 below which it is rounding, and says nothing of errors."""
+_BY_CHANCE = 1e-3
+"""Probability of a larger misfit of one resonance by chance alone, below which the band holds more than one."""
+_OFF = 0.01
+"""Misfit over the peak above which one resonance does not describe lines whose errors are not known."""
+_FEW_LINES = 0.5
+"""Lines in the half-power bandwidth below which the leakage takes the place of the resonance."""
+_LEAKAGE_ERROR = 0.1
+"""Standard error of what the leakage moves, as a share of it: rho is that of the lines in the mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +63,8 @@ class Resonance:
         What was fitted: rad/s, `|H|` measured and fitted.
     error : ndarray of float, shape (line,)
         Standard error of the magnitude; zeros where not known.
+    doubts : tuple of str
+        Why the estimates are not to be relied on, each a part of a sentence.
     """
 
     natural_angular_frequency: Estimate
@@ -60,6 +77,12 @@ class Resonance:
     magnitude: Floats
     fitted: Floats
     error: Floats
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Whether the estimates are to be relied on, in one line, and why not."""
+        return verdict_of(self.doubts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +98,11 @@ class Curve:
         Standard error of each real part; zeros where not known.
     form, unit : str
         One of `FORMS`; CF unit of C.
+    leakage : Leakage
+        What the lines show of the response.
+    estimator : {"h1", "h2"}
+    common : float
+        Lines that are worth one.
     """
 
     angular_frequency: Floats
@@ -82,6 +110,9 @@ class Curve:
     error: Floats
     form: str = "displacement"
     unit: str = "1"
+    leakage: Leakage = NO_LEAKAGE
+    estimator: str = "h1"
+    common: float = 1.0
 
     @property
     def complex(self) -> bool:
@@ -121,7 +152,7 @@ def curve_of(
     lines = (found.frequency >= low) & (found.frequency <= high)
     if band is None:
         # Where hardly anything was driven, the quotient is noise over noise, and may be the highest of all.
-        driven = np.abs(response) * (found.drive_power > _DRIVEN)
+        driven = np.abs(response) * (found.drive_power > DRIVEN)
         peak, width = _peak(omega, driven)
         finest = max(2.0 * np.pi * found.resolution, 2.0 * float(omega[1] - omega[0]))
         lines &= np.abs(omega - peak) <= _BAND * max(width, finest)
@@ -131,9 +162,31 @@ def curve_of(
             f"{found.frequency[1] - found.frequency[0]:.4g} Hz apart. Widen the band, or take longer segments."
         )
     magnitude = np.abs(response)
-    error = magnitude * found.relative_error if found.averages > 1.5 else np.zeros_like(magnitude)
-    chosen = response[lines] if found.phase_known else magnitude[lines]
-    return Curve(omega[lines], chosen, error[lines], form, _constant_unit(form, found.units))
+    known = found.averages > 1.5 and float(np.max(found.coherence[lines])) < 1.0 - _ROUNDING
+    error = _errors(magnitude, found) if known else np.zeros_like(magnitude)
+    return Curve(
+        omega[lines],
+        response[lines] if found.phase_known else magnitude[lines],
+        error[lines],
+        form,
+        _constant_unit(form, found.units),
+        found.leakage,
+        estimator,
+        found.common,
+    )
+
+
+def _errors(magnitude: Floats, found: FrequencyResponse) -> Floats:
+    """Return the standard errors of the lines, from the coherence of each and its neighbours.
+
+    Few averages make the coherence of one line too high and too uncertain to weigh with.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    unbiased = found.averages / (found.averages - 1.0)
+    variance = unbiased * (magnitude * found.relative_error) ** 2
+    # geometric: leakage errs by a share of the response, which changes fast about its peak
+    return np.asarray(np.exp(0.5 * uniform_filter1d(np.log(np.maximum(variance, 1e-300)), _NEIGHBOURS)))
 
 
 def _form_of(units: tuple[str, str]) -> str:
@@ -153,34 +206,8 @@ def _constant_unit(form: str, units: tuple[str, str]) -> str:
 
 def _peak(omega: Floats, magnitude: Floats) -> tuple[float, float]:
     """Return the place of the highest value, and the width at which it has fallen by sqrt 2."""
-    low, high = _half_power(omega, magnitude)
+    low, high = half_power(omega, magnitude)
     return float(omega[np.argmax(magnitude)]), high - low if np.isfinite(high - low) else 0.0
-
-
-def _half_power(omega: Floats, magnitude: Floats) -> tuple[float, float]:
-    """Return where the magnitude falls to its maximum over sqrt 2, on both sides; NaN where it does not."""
-    top = int(np.argmax(magnitude))
-    level = _highest(magnitude, top) / np.sqrt(2.0)
-    below = np.flatnonzero(magnitude < level)
-    left, right = below[below < top], below[below > top]
-
-    def crossing(low: int, high: int) -> float:
-        share = (level - magnitude[low]) / (magnitude[high] - magnitude[low])
-        return float(omega[low] + share * (omega[high] - omega[low]))
-
-    return (
-        crossing(int(left[-1]), int(left[-1]) + 1) if len(left) else np.nan,
-        crossing(int(right[0]), int(right[0]) - 1) if len(right) else np.nan,
-    )
-
-
-def _highest(magnitude: Floats, top: int) -> float:
-    """Return the height of the parabola through the highest value and its neighbours."""
-    if not 0 < top < len(magnitude) - 1:
-        return float(magnitude[top])
-    before, here, after = magnitude[top - 1 : top + 2]
-    bend = before - 2.0 * here + after
-    return float(here - (after - before) ** 2 / (8.0 * bend)) if bend < 0.0 else float(here)
 
 
 def half_power_damping_ratio(omega: Floats, magnitude: Floats) -> float:
@@ -188,7 +215,7 @@ def half_power_damping_ratio(omega: Floats, magnitude: Floats) -> float:
 
     `omega` is in rad/s, `magnitude` is `|H|`.
     """
-    low, high = _half_power(omega, magnitude)
+    low, high = half_power(omega, magnitude)
     return float((high**2 - low**2) / (4.0 * omega[int(np.argmax(magnitude))] ** 2))
 
 
@@ -203,41 +230,69 @@ def _shape(omega: Floats, natural: float, damping: float, form: str) -> Complexe
 def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     """Fit one resonance to a frequency response by least squares, weighted by its errors where these are known.
 
-    Standard errors are those of the scatter about the fit, neighbouring lines correlated or not, or those that the
-    coherence predicts, whichever are larger. Of a frequency response the part around its highest peak is fitted, see
-    `curve_of`.
+    What is fitted is what the lines show of the resonance (`Leakage`). Standard errors are those of the scatter about
+    the fit, neighbouring lines correlated or not, or those that the coherence predicts, whichever are larger, and a
+    tenth of what the leakage moves. Of a frequency response the part around its highest peak is fitted, see
+    `curve_of`. A misfit that chance does not explain, as of a second resonance in the band, is a doubt.
 
     Raises
     ------
     EstimationError
         No resonance is in the band.
     """
+    curve = curve_of(curve) if isinstance(curve, FrequencyResponse) else curve
+    found = _solved(curve, _start(curve))
+    covariance, _ = coloured_covariance(found.jac, found.fun, 4 if curve.complex else 2)
+    if np.all(curve.error > 0.0):
+        covariance = _larger(covariance, np.linalg.pinv(found.jac.T @ found.jac))
+    if len(curve.leakage.weights) > 1:
+        unleaked = _solved(replace(curve, leakage=NO_LEAKAGE), found.x).x
+        covariance = covariance + np.diag((_LEAKAGE_ERROR * (found.x - unleaked)) ** 2)
+    resonance = _described(curve, found.x, covariance, np.abs(_model(curve, found.x)))
+    constant = resonance.modal_constant
+    if abs(constant.value) < _STANDS_OUT * constant.standard_error:
+        raise EstimationError(
+            f"resonance: expected one that stands out of the noise, got a modal constant of "
+            f"{constant.value:.3g} +- {constant.standard_error:.2g}. Choose another band."
+        )
+    return replace(resonance, doubts=(*_misfit(curve, found), *_too_narrow(curve, resonance)))
+
+
+def _model(curve: Curve, p: Floats) -> Floats | Complexes:
+    """Return what the lines show of a resonance: its frequency, damping ratio, C and R."""
+    omega, seen = curve.angular_frequency, curve.leakage.seen
+    if not curve.complex:
+        return np.asarray(np.abs(seen(lambda at: p[2] * _shape(at, p[0], p[1], curve.form), omega) + p[3]))
+    constant, others = p[2] + 1j * p[3], p[4] + 1j * p[5]
+
+    def response(at: Floats) -> Complexes:
+        return np.asarray(constant * _shape(at, p[0], p[1], curve.form) + others)
+
+    cross = seen(response, omega)
+    if curve.estimator == "h1" or len(curve.leakage.weights) == 1:
+        return cross
+    return np.asarray(seen(lambda at: np.abs(response(at)) ** 2 + 0j, omega) / np.conj(cross))
+
+
+def _solved(curve: Curve, start: Floats) -> OptimizeResult:
+    """Return the least-squares fit, its parameters within the band.
+
+    Raises
+    ------
+    EstimationError
+        The fit leaves the band.
+    """
     from scipy.optimize import least_squares
 
-    curve = curve_of(curve) if isinstance(curve, FrequencyResponse) else curve
-    omega, magnitude = curve.angular_frequency, np.abs(curve.response)
-    peak, width = _peak(omega, magnitude)
+    omega = curve.angular_frequency
     known = bool(np.all(curve.error > 0.0))
-    weight = 1.0 / curve.error if known else np.full(len(omega), 1.0 / float(np.max(magnitude)))
-
-    def model(p: Floats) -> Floats | Complexes:
-        shape = _shape(omega, p[0], p[1], curve.form)
-        if curve.complex:
-            return np.asarray((p[2] + 1j * p[3]) * shape + p[4] + 1j * p[5])
-        return np.asarray(np.abs(p[2] * shape + p[3]))
+    largest = float(np.max(np.abs(curve.response)))
+    weight = 1.0 / curve.error if known else np.full(len(omega), 1.0 / largest)
 
     def residual(p: Floats) -> Floats:
         # Real and imaginary part of each line in turn: neighbours in the residual are neighbours in frequency.
-        return np.asarray((model(p) - curve.response) * weight).view(np.float64)
+        return np.asarray((_model(curve, p) - curve.response) * weight).view(np.float64)
 
-    # a sweep up and down has each frequency twice
-    spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)
-    if not spacing > 0.0:
-        raise EstimationError(
-            f"resonance: expected lines at several frequencies, got {omega[0] / (2 * np.pi):.6g} Hz alone. "
-            "Choose another band."
-        )
-    start = _start(curve, peak, max(width, spacing))
     found = least_squares(residual, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400)
     natural, damping = float(found.x[0]), float(found.x[1])
     if not (omega[0] <= natural <= omega[-1] and 0.0 < damping < 1.0):
@@ -245,17 +300,44 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
             f"resonance: expected one from {omega[0] / (2 * np.pi):.6g} to {omega[-1] / (2 * np.pi):.6g} Hz, got "
             f"{natural / (2 * np.pi):.6g} Hz with damping ratio {damping:.3g}. Choose another band."
         )
-    covariance, _ = coloured_covariance(found.jac, found.fun, 4 if curve.complex else 2)
-    if known:
-        covariance = _larger(covariance, np.linalg.pinv(found.jac.T @ found.jac))
-    described = _described(curve, found.x, covariance, np.abs(model(found.x)))
-    if abs(described.modal_constant.value) < _STANDS_OUT * described.modal_constant.standard_error:
-        raise EstimationError(
-            f"resonance: expected one that stands out of the noise, got a modal constant of "
-            f"{described.modal_constant.value:.3g} +- {described.modal_constant.standard_error:.2g}. "
-            "Choose another band."
-        )
-    return described
+    return found
+
+
+def _misfit(curve: Curve, found: OptimizeResult) -> tuple[str, ...]:
+    """Return the doubt that one resonance does not describe the lines, where it does not."""
+    from scipy.stats import chi2
+
+    omega = curve.angular_frequency
+    parts = found.fun.reshape(len(omega), -1)
+    left = np.sum(parts**2, axis=1)
+    farthest = omega[int(np.argmax(left))] / (2.0 * np.pi)
+    why = (
+        f"another resonance near the fitted one (the misfit is largest at {farthest:.5g} Hz), or motion that is not "
+        "linear"
+    )
+    if np.all(curve.error > 0.0):
+        freedom = max((parts.size - len(found.x)) / curve.common, 1.0)
+        mean = float(np.sum(left)) / max(parts.size - len(found.x), 1)
+        if mean * freedom > float(chi2.isf(_BY_CHANCE, freedom)):
+            return (f"the fit leaves {np.sqrt(mean):.2g} times what the coherence explains: {why}",)
+        return ()
+    # residuals are shares of the peak here
+    rms = float(np.sqrt(np.mean(left)))
+    if rms > _OFF and not residual_test(found.fun, 1.0, np.pi / 2.0).adequate:
+        return (f"the fit leaves {100.0 * rms:.2g} % of the peak, and not as noise: {why}",)
+    return ()
+
+
+def _too_narrow(curve: Curve, resonance: Resonance) -> tuple[str, ...]:
+    """Return the doubt that lines are too far apart for the resonance, where they are."""
+    width = 2.0 * resonance.damping_ratio.value * resonance.natural_angular_frequency.value
+    lines = width / (2.0 * curve.leakage.spacing) if curve.leakage.spacing else np.inf
+    if lines >= _FEW_LINES:
+        return ()
+    return (
+        f"the half-power bandwidth has {lines:.2g} lines, and leakage takes the place of the resonance: record "
+        "longer, or fit the decay",
+    )
 
 
 def _larger(one: Floats, other: Floats) -> Floats:
@@ -264,9 +346,25 @@ def _larger(one: Floats, other: Floats) -> Floats:
     return np.asarray(one * np.outer(scale, scale))
 
 
-def _start(curve: Curve, peak: float, width: float) -> Floats:
-    damping = min(0.5 * width / peak, 0.3)
-    shape = _shape(curve.angular_frequency, peak, damping, curve.form)
+def _start(curve: Curve) -> Floats:
+    """Return the parameters that the peak and its width suggest.
+
+    Raises
+    ------
+    EstimationError
+        All lines have one frequency.
+    """
+    omega = curve.angular_frequency
+    # a sweep up and down has each frequency twice
+    spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)
+    if not spacing > 0.0:
+        raise EstimationError(
+            f"resonance: expected lines at several frequencies, got {omega[0] / (2 * np.pi):.6g} Hz alone. "
+            "Choose another band."
+        )
+    peak, width = _peak(omega, np.abs(curve.response))
+    damping = min(0.5 * max(width, spacing) / peak, 0.3)
+    shape = _shape(omega, peak, damping, curve.form)
     if not curve.complex:
         return np.array([peak, damping, float(np.max(curve.response) / np.max(np.abs(shape))), 0.0])
     columns = np.column_stack([shape, np.ones_like(shape)])
@@ -307,8 +405,8 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
     if found.resolution < 0.25 * width:
         return ()
     return (
-        f"a line is {found.resolution:.3g} Hz wide and the resonance {width:.3g} Hz: the damping ratio may be too "
-        f"large by leakage. Take longer segments ({option('segment')}), or fit the decay.",
+        f"a line is {found.resolution:.3g} Hz wide and the resonance {width:.3g} Hz: the fit takes the leakage out, "
+        f"and its doubt widens the intervals. Take longer segments ({option('segment')}), or fit the decay.",
     )
 
 
@@ -345,7 +443,7 @@ class ResponseEstimates:
         ratio = fit.half_power_damping_ratio / fit.damping_ratio.value
         if not np.isfinite(ratio):
             said.append("the band does not hold both half-power points: there is no cross-check.")
-        elif abs(ratio - 1.0) > 0.2:
+        elif abs(ratio - 1.0) > 0.2 and not (self.response and resolution_remark(self.response, fit)):
             said.append(
                 f"the half-power bandwidth gives {ratio:.2g} times the fitted damping ratio: another mode, noise, or "
                 "lines too far apart."
@@ -372,5 +470,9 @@ class ResponseEstimates:
             }
             parts.append(xr.Dataset(described(measured)))
         return xr.merge(parts, combine_attrs="override").assign_attrs(
-            estimates="response", title=self.title, form=fit.form, remarks="\n".join(self.words())
+            estimates="response",
+            title=self.title,
+            form=fit.form,
+            verdict=fit.verdict,
+            remarks="\n".join(self.words()),
         )

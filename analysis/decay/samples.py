@@ -13,6 +13,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import option
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 FEWEST_SAMPLES = 16
 """Number of samples below which the five unknowns of a decaying cosine are not fitted."""

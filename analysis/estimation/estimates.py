@@ -118,6 +118,36 @@ class FittedMotion:
     method: str
 
 
+@dataclass(frozen=True, slots=True)
+class RestitutionOfSpeed:
+    """A restitution that changes with the speed of approach, at the speeds of the impacts.
+
+    Attributes
+    ----------
+    speed : ndarray, shape (bounce,)
+        Unit of the channel per s.
+    single : ndarray, shape (bounce,)
+        Ratio at each impact alone.
+    fitted, low, high : ndarray, shape (bounce,)
+        r(v) and the ends of its interval.
+    """
+
+    speed: Floats
+    single: Floats
+    fitted: Floats
+    low: Floats
+    high: Floats
+
+    def words(self, unit: str) -> str:
+        """Return how the restitution changes, as a sentence; `unit` is that of the channel."""
+        slow, fast = int(np.argmin(self.speed)), int(np.argmax(self.speed))
+        shown = written_unit(f"{'' if unit == '1' else unit} s-1".strip())
+        return (
+            f"The restitution changes with the speed of impact: {self.fitted[slow]:.3g} at {self.speed[slow]:.3g} "
+            f"{shown}, {self.fitted[fast]:.3g} at {self.speed[fast]:.3g} {shown}"
+        )
+
+
 @dataclass(frozen=True)
 class ImpactEstimates:
     """Estimates of all methods from one record of impacting motion.
@@ -144,6 +174,8 @@ class ImpactEstimates:
     impact_times : ndarray, shape (impact,)
         s.
     motion : FittedMotion or None
+    of_speed : RestitutionOfSpeed or None
+        r(v), in place of one restitution that the data contradict.
     """
 
     channel: str
@@ -157,6 +189,7 @@ class ImpactEstimates:
     confidence: float = 0.95
     impact_times: Floats = field(default_factory=lambda: np.empty(0))
     motion: FittedMotion | None = None
+    of_speed: RestitutionOfSpeed | None = None
 
     def reasons(self, method: str) -> list[str]:
         """Return what makes the estimates of a method unsure."""
@@ -204,7 +237,33 @@ class ImpactEstimates:
                 measured=("time", motion.measured, described("measured displacement", self.unit)),
                 fitted=("time", motion.fitted, fitted),
             ).assign_coords(time=("time", motion.time, described("time", "s")))
+        if self.of_speed is not None:
+            found = found.assign(self._of_speed())
         return found.assign_attrs(self._attributes())
+
+    def _of_speed(self) -> dict[str, tuple[str, Floats, dict[str, str]]]:
+        """Return r(v) as variables over the impacts between two flights."""
+        found, words = self.of_speed, "restitution at the speed of the impact"
+        assert found is not None
+        return {
+            "bounce_speed": (
+                "bounce",
+                found.speed,
+                described("speed of approach", self.unit_of("impact_velocity")),
+            ),
+            "bounce_ratio": ("bounce", found.single, described("ratio of the flights after and before")),
+            "restitution_of_speed": ("bounce", found.fitted, described(words)),
+            "restitution_of_speed_low": (
+                "bounce",
+                found.low,
+                described(f"{words}, lower end of the interval"),
+            ),
+            "restitution_of_speed_high": (
+                "bounce",
+                found.high,
+                described(f"{words}, upper end of the interval"),
+            ),
+        }
 
     def _attributes(self) -> dict[str, str | float]:
         """Return what belongs to the whole table."""
@@ -237,6 +296,8 @@ def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
     """Print the verdict, all methods side by side, how far errors move the estimates, refusals and remarks."""
     console.print(estimates.verdict)
     console.print(_estimates(estimates))
+    if estimates.of_speed is not None:
+        console.print(_speeds(estimates, estimates.of_speed))
     if estimates.conditioning:
         console.print(_conditioning(estimates))
     for name, value in estimates.facts.items():
@@ -264,6 +325,15 @@ def _estimates(estimates: ImpactEstimates) -> Table:
                 words = unit = ""
         if not words:
             rows.add_section()
+    return rows
+
+
+def _speeds(estimates: ImpactEstimates, found: RestitutionOfSpeed) -> Table:
+    """Return the restitution at the speed of each impact."""
+    unit = written_unit(estimates.unit_of("impact_velocity"))
+    rows = table("restitution against speed", f">speed ({unit})", ">one impact", ">r(v)", ">from", ">to")
+    for cells in zip(found.speed, found.single, found.fitted, found.low, found.high, strict=True):
+        rows.add_row(*(f"{cell:.4g}" for cell in cells))
     return rows
 
 

@@ -11,7 +11,13 @@ import math
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.estimation.estimates import Doubt, FittedMotion, ImpactEstimates, MethodEstimate
+from vibroimpact.analysis.estimation.estimates import (
+    Doubt,
+    FittedMotion,
+    ImpactEstimates,
+    MethodEstimate,
+    RestitutionOfSpeed,
+)
 from vibroimpact.analysis.estimation.physics import Floats, Known
 from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment_channel
 from vibroimpact.analysis.recording import Channel, channel_of
@@ -25,6 +31,10 @@ _FEWEST_FLIGHTS = 3
 _INSTANT = 1e-4
 # Probability of a larger scatter of the ratios by chance alone, below which they are not one ratio.
 _SELDOM = 1e-4
+# The same for r(v), below which it needs one power of the speed's logarithm more.
+_RATHER = 0.1
+# Change of r(v) below which it is one ratio, and the largest part of the scatter about one ratio that r(v) leaves.
+_SAME_RATIO, _CLEARER = 2e-3, 0.1
 # Ratio of a flight's length to that of the one before above which impacts in it were not seen.
 _LONGER = 1.02
 # Relative deviation of a flight's length from the median above which it is none of P(1,1); the largest part of such.
@@ -54,7 +64,8 @@ def estimate_bounces(
     Returns
     -------
     ImpactEstimates
-        One method, `flight_times`; restitution and stop.
+        One method, `flight_times`; restitution and stop. A restitution that is not the same at all speeds is no
+        single number: `of_speed` has r(v) instead.
 
     Raises
     ------
@@ -89,18 +100,32 @@ def estimate_bounces(
     error = float(np.std(levels, ddof=1)) / math.sqrt(len(levels))
     reach = float(student.ppf(0.5 + confidence / 2.0, len(levels) - 1)) * error
     stop = MethodEstimate.within(float(np.mean(levels)), error, reach)
+    values, of_speed = {"restitution": restitution, "stop_position": stop}, None
     doubts: tuple[Doubt, ...] = ()
+    remarks: tuple[str, ...] = ()
+    scatter = excess
+    if excess > 1.0:
+        of_speed, scatter = _of_speed(impacts, cut, confidence)
+    if of_speed is not None and float(np.ptp(of_speed.fitted)) > _SAME_RATIO and scatter < _CLEARER * excess:
+        excess = scatter
+        del values["restitution"]
+        remarks = (
+            f"{of_speed.words(channel.unit)}. Drag, a spring or a force changes flight times alike: r(v) counts what "
+            "they do as loss at the impact.",
+        )
+    else:
+        of_speed = None
     if excess > 1.0:
         doubts = (
             Doubt(
-                f"flight times do not shrink by one ratio (scatter {excess:.2g} times that of their errors): drag, a "
-                "spring, a force, or a restitution that changes with the speed"
+                f"flight times do not shrink by one ratio, nor by one that depends on the speed alone (scatter "
+                f"{excess:.2g} times that of their errors): drag, a spring, or a force"
             ),
         )
     return ImpactEstimates(
         channel.name,
         channel.unit,
-        {FLIGHT_TIMES: {"restitution": restitution, "stop_position": stop}},
+        {FLIGHT_TIMES: values},
         facts={
             "impacts": float(len(impacts)),
             "noise": cut.signal.noise,
@@ -108,8 +133,10 @@ def estimate_bounces(
             "side": cut.signal.side,
         },
         doubts=doubts,
+        remarks=remarks,
         confidence=confidence,
         impact_times=np.array([impact.time for impact in impacts]),
+        of_speed=of_speed,
         motion=FittedMotion(channel.time, channel.values, _parabolas(cut, len(impacts)), FLIGHT_TIMES),
     )
 
@@ -126,28 +153,96 @@ def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[M
 
     Generalized least squares of log T[n] = log T[0] + n log r: neighbouring flights share the error of an instant.
     """
-    from scipy.stats import chi2
     from scipy.stats import t as student
 
-    times = np.array([impact.time for impact in impacts])
-    errors = np.hypot([impact.time_error for impact in impacts], _INSTANT * interval)
-    lengths = np.diff(times)
-    difference = (np.eye(len(times))[1:] - np.eye(len(times))[:-1]) / lengths[:, None]
-    covariance = difference @ np.diag(errors**2) @ difference.T
-    root = np.linalg.cholesky(covariance)
-    columns = np.linalg.solve(root, np.column_stack([np.ones(len(lengths)), np.arange(len(lengths))]))
-    target = np.linalg.solve(root, np.log(lengths))
-    solution = np.linalg.lstsq(columns, target, rcond=None)[0]
+    lengths, covariance = _lengths(impacts, interval)
+    columns = np.column_stack([np.ones(len(lengths)), np.arange(float(len(lengths)))])
+    solution, found, square = _generalized(columns, np.log(lengths), covariance)
     freedom = len(lengths) - 2
-    square = float(np.sum((target - columns @ solution) ** 2))
     widened = max(1.0, math.sqrt(square / freedom))
-    error = widened * math.sqrt(float(np.linalg.inv(columns.T @ columns)[1, 1]))
+    error = widened * math.sqrt(float(found[1, 1]))
     reach = float(student.ppf(0.5 + confidence / 2.0, freedom)) * error
     slope = float(solution[1])
     ratio = math.exp(slope)
     estimate = MethodEstimate(ratio, ratio * error, math.exp(slope - reach), math.exp(slope + reach))
-    by_chance = square <= float(chi2.isf(_SELDOM, freedom))
-    return estimate, 0.0 if by_chance else widened
+    return estimate, 0.0 if _by_chance(square, freedom) else widened
+
+
+def _lengths(impacts: list[Impact], interval: float) -> tuple[Floats, Floats]:
+    """Return the flight times, s, and the covariance of their logarithms: neighbours share the error of an instant."""
+    times = np.array([impact.time for impact in impacts])
+    errors = np.hypot([impact.time_error for impact in impacts], _INSTANT * interval)
+    lengths = np.diff(times)
+    difference = (np.eye(len(times))[1:] - np.eye(len(times))[:-1]) / lengths[:, None]
+    return lengths, difference @ np.diag(errors**2) @ difference.T
+
+
+def _generalized(columns: Floats, target: Floats, covariance: Floats) -> tuple[Floats, Floats, float]:
+    """Return the generalized least-squares solution, its covariance, and the sum of squares in standard errors."""
+    root = np.linalg.cholesky(covariance)
+    columns, target = np.asarray(np.linalg.solve(root, columns)), np.asarray(np.linalg.solve(root, target))
+    solution: Floats = np.linalg.lstsq(columns, target, rcond=None)[0]
+    uncertain: Floats = np.linalg.inv(columns.T @ columns)
+    return solution, uncertain, float(np.sum((target - columns @ solution) ** 2))
+
+
+def _by_chance(square: float, freedom: int, probability: float = _SELDOM) -> bool:
+    from scipy.stats import chi2
+
+    return square <= float(chi2.isf(probability, freedom))
+
+
+def _of_speed(
+    impacts: list[Impact], cut: Segmentation, confidence: float
+) -> tuple[RestitutionOfSpeed | None, float]:
+    """Return r(v), and its scatter over what errors of the instants explain, 0 where these explain it.
+
+    The logarithm of the ratio of the flights before and after an impact is a line in that of the speed, or a parabola
+    where a line is not enough; what one power more changes widens the interval. v = g T / 2 with the acceleration g of
+    the flights' parabolas.
+    """
+    from scipy.stats import t as student
+
+    lengths, covariance = _lengths(impacts, cut.signal.interval)
+    gravity = _acceleration(cut, len(impacts))
+    step = np.eye(len(lengths))[1:] - np.eye(len(lengths))[:-1]
+    ratios, covariance = step @ np.log(lengths), step @ covariance @ step.T
+    speeds = 0.5 * gravity * lengths[:-1]
+    relative = np.log(speeds) - np.mean(np.log(speeds))
+    found, excess = None, 1.0
+    for degree in (1, 2):
+        freedom = len(ratios) - degree - 1
+        if freedom < 1 or not gravity > 0.0:
+            break
+        columns = np.vander(relative, degree + 1)
+        solution, uncertain, square = _generalized(columns, ratios, covariance)
+        widened = max(1.0, math.sqrt(square / freedom))
+        error = widened * np.sqrt(np.einsum("ij,jk,ik->i", columns, uncertain, columns))
+        reach = float(student.ppf(0.5 + confidence / 2.0, freedom)) * error
+        level = columns @ solution
+        if freedom > 1:
+            # the next power shows how far the form of r(v) may be wrong
+            columns = np.vander(relative, degree + 2)
+            reach = reach + np.abs(columns @ _generalized(columns, ratios, covariance)[0] - level)
+        found = RestitutionOfSpeed(
+            speeds, np.exp(ratios), np.exp(level), np.exp(level - reach), np.exp(level + reach)
+        )
+        excess = 0.0 if _by_chance(square, freedom) else widened
+        if _by_chance(square, freedom, _RATHER):
+            break
+    return found, excess
+
+
+def _acceleration(cut: Segmentation, impacts: int) -> float:
+    """Return the acceleration towards the stop, unit of the channel per s^2: the median of the flights' parabolas."""
+    signal = cut.signal
+    bends = [
+        2.0
+        * np.polynomial.Polynomial.fit(signal.time[one.index], signal.values[one.index], 2).convert().coef[-1]
+        for one in cut.flights[: impacts - 1]
+        if one.usable
+    ]
+    return float(np.median(bends)) if bends else 0.0
 
 
 def _parabolas(cut: Segmentation, impacts: int) -> Floats:

@@ -99,25 +99,25 @@ def correlation_sums(
     return CorrelationSums(radii, near_pairs(values, radii, embedding, window=theiler), pairs)
 
 
-def fitted_slopes(sums: CorrelationSums, *, above: float = 0.0) -> Floats:
-    """Return the slope of ln C against ln eps where C is in `WINDOW`, for every embedding.
+def fitted_slopes(sums: CorrelationSums, *, above: float = 0.0, window: Span = WINDOW) -> Floats:
+    """Return the slope of ln C against ln eps where C is in a window, for every embedding.
 
     Least squares over the radii whose C lies in the window, at which at least 30 pairs were counted; those below
     `above`, such as the grid of the values, do not count. The slope is 0 where C is the same over the lowest octave and
     not below the window, as for a finite number of points; NaN where fewer than three radii lie in the window, those
     between the same steps of a grid being one.
     """
-    return np.array([_fitted_slope(sums, place, above) for place in range(len(sums.pairs))])
+    return np.array([_fitted_slope(sums, place, above, window) for place in range(len(sums.pairs))])
 
 
-def _fitted_slope(sums: CorrelationSums, place: int, above: float) -> float:
+def _fitted_slope(sums: CorrelationSums, place: int, above: float, window: Span) -> float:
     near, share = sums.near[place], sums.sums[place]
     usable = sums.radii >= above
     # a finite number of points: C stays at the share of pairs that are the same, however small the radius
     lowest = near[usable][: RADII_PER_OCTAVE + 1]
-    if share[usable][0] >= WINDOW[0] and np.all(lowest == lowest[0]):
+    if share[usable][0] >= window[0] and np.all(lowest == lowest[0]):
         return 0.0
-    chosen = usable & (share >= WINDOW[0]) & (share <= WINDOW[1]) & (near >= FEWEST_PAIRS)
+    chosen = usable & (share >= window[0]) & (share <= window[1]) & (near >= FEWEST_PAIRS)
     # between two steps of a grid C stands still, and many radii are worth one
     enough = len(np.unique(near[chosen])) if above > 0.0 else np.count_nonzero(chosen)
     if enough < FEWEST_RADII:

@@ -5,6 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.correlation import correlation_sums, fitted_slopes
+from vibroimpact.analysis.intervals.dimension import interval_dimension
+from vibroimpact.analysis.intervals.trains import interval_train
 from vibroimpact.fmus.core import MOST_RADII, near_pairs, radius_ladder
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
@@ -129,3 +131,13 @@ def test_values_that_are_one_point_or_too_few_have_no_sums() -> None:
         correlation_sums(np.ones(50), 2)
     with pytest.raises(EstimationError, match="at least one pair"):
         correlation_sums(np.array([1.0, 2.0, 3.0]), 3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.02, 0.05, 0.1])
+def test_a_dimension_that_noise_made_is_not_called_that_of_the_motion(noise: float) -> None:
+    motion = henon(1500)
+    intervals = motion + noise * np.std(motion) * np.random.default_rng(2).normal(size=len(motion))
+    _, attributes = interval_dimension(interval_train(np.cumsum(2.0 + intervals)), "raw")
+    words = attributes["dimension_raw"]
+    assert "low-dimensional" in words
+    assert ("with noise in it" in words) is (noise > 0.0)

@@ -1,0 +1,121 @@
+"""A second oscillation in a free decay: another mode that beats with the first, or a hum.
+
+A damping law explains neither. Two decaying cosines do, and are compared with the laws by the same criterion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vibroimpact.analysis.decay.exponential import ExponentialDecay, decaying_cosine, spectral_peak
+from vibroimpact.analysis.decay.residuals import residual_test
+from vibroimpact.analysis.decay.samples import DecaySamples, Floats
+from vibroimpact.fmus.errors import EstimationError
+
+_LINES_APART = 1.5
+"""Distance from the first frequency, over one period in the record, below which a slow change of it looks the same."""
+_EXPLAINED = 0.9
+"""Part of the residual's variance that a second oscillation has to explain where what is left is no noise."""
+_CLEARLY = 30.0
+"""Difference of Akaike's criterion above which two cosines are better than a damping law.
+
+The highest of thousands of lines of noise takes about 15 off the criterion.
+"""
+_PARAMETERS = 10
+"""Two decaying cosines, the offset, and the variance of the residual."""
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOscillation:
+    """What a second decaying cosine leaves.
+
+    Attributes
+    ----------
+    angular_frequency : float
+        rad/s.
+    amplitude : float
+        Unit of the samples, at the first sample.
+    aic : float
+        Akaike's criterion of both cosines together, for white residuals.
+    """
+
+    angular_frequency: float
+    amplitude: float
+    aic: float
+
+    def better_than(self, aic: float) -> bool:
+        """Tell whether two cosines describe the decay better than a fit of this criterion."""
+        return self.aic < aic - _CLEARLY
+
+    @property
+    def words(self) -> str:
+        """What oscillates beside the mode, as part of a sentence."""
+        hertz = self.angular_frequency / (2.0 * np.pi)
+        return f"a second oscillation of {hertz:.4g} Hz is in the window: another mode, or a hum"
+
+
+def second_oscillation(samples: DecaySamples, first: ExponentialDecay) -> SecondOscillation | None:
+    """Return the second oscillation of a decay, None where there is none.
+
+    Both cosines are fitted together, the second from the highest peak of the residual's spectrum on. A frequency at
+    which the first oscillation itself changes slowly, and a multiple of it, as friction and springs make them, are no
+    second oscillation.
+    """
+    residual = samples.value - first.fitted
+    time = samples.time - samples.time[0]
+    apart = _LINES_APART * 2.0 * np.pi / float(time[-1])
+    omega, own = first.angular_frequency.value, first.decay_rate.value
+    try:
+        start = spectral_peak(replace(samples, value=residual))
+    except EstimationError:
+        return None  # nothing is left
+    found = _both(time, samples.value, (omega, own), (start, own))
+    if found is None:
+        return None
+    parameters, left = found
+    places = parameters[[2, 6]]
+    second = 4 * int(np.argmax(np.abs(places - omega)))
+    other = float(parameters[second + 2])
+    multiple = max(round(other / omega), 1) * omega
+    explained = 1.0 - float(left @ left) / float(residual @ residual)
+    noise = residual_test(left, float(np.max(np.abs(samples.value))), omega * samples.mean_interval).adequate
+    if not other > apart or abs(other - multiple) < apart or not (noise or explained > _EXPLAINED):
+        return None
+    count = len(time)
+    aic = count * float(np.log(max(float(left @ left) / count, 1e-300))) + 2.0 * _PARAMETERS
+    return SecondOscillation(other, float(np.hypot(*parameters[second : second + 2])), aic)
+
+
+def _both(
+    time: Floats, value: Floats, first: tuple[float, float], second: tuple[float, float]
+) -> tuple[Floats, Floats] | None:
+    """Return the parameters of two decaying cosines and the offset, and the residual.
+
+    Start values are pairs of angular frequency and decay rate. None where the fit does not settle.
+    """
+    from scipy.optimize import least_squares
+
+    columns = [
+        np.exp(-rate * time) * turned(omega * time)
+        for omega, rate in (first, second)
+        for turned in (np.cos, np.sin)
+    ]
+    linear = np.linalg.lstsq(np.column_stack([*columns, np.ones_like(time)]), value, rcond=None)[0]
+    start = np.array([*linear[:2], *first, *linear[2:4], *second, linear[4]])
+
+    def parts(p: Floats) -> tuple[tuple[Floats, Floats], ...]:
+        return tuple(decaying_cosine(np.append(p[place : place + 4], 0.0), time) for place in (0, 4))
+
+    def residual(p: Floats) -> Floats:
+        return np.asarray(sum(motion for motion, _ in parts(p)) + p[8] - value)
+
+    def derivatives(p: Floats) -> Floats:
+        return np.hstack([*(columns[:, :4] for _, columns in parts(p)), np.ones((len(time), 1))])
+
+    with np.errstate(all="ignore"):  # a trial step may overflow; it is then shortened
+        found = least_squares(residual, start, jac=derivatives, x_scale="jac", max_nfev=200)
+    if not found.success or not np.all(np.isfinite(found.x)):
+        return None
+    return found.x, np.asarray(found.fun)
