@@ -204,8 +204,8 @@ class Instance(ABC):
     # ---- life ----
 
     @abstractmethod
-    def enter_initialization(self, start_time: float) -> None:
-        """Enter initialization mode at `start_time`, s."""
+    def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
+        """Enter initialization mode at `start_time`, s, with a relative tolerance; None: the FMU's own."""
 
     def exit_initialization(self) -> None:
         """Leave initialization mode; the FMU checks its parameters here."""

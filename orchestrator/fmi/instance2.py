@@ -104,12 +104,13 @@ class Instance2(Instance):
             self._pointer.value = None
         super().free()
 
-    def enter_initialization(self, start_time: float) -> None:
-        """Set the experiment up and enter initialization mode at `start_time`, s."""
+    def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
+        """Set the experiment up and enter initialization mode, as the abstract method says."""
         self.time = start_time
-        no, zero = c_int(0), c_double(0.0)
-        setup = self._function("SetupExperiment")
-        self.check(setup(self._pointer, no, zero, c_double(start_time), no, zero), "SetupExperiment")
+        given = (c_int(tolerance is not None), c_double(tolerance or 0.0))
+        no_end = (c_int(0), c_double(0.0))
+        status = self._function("SetupExperiment")(self._pointer, *given, c_double(start_time), *no_end)
+        self.check(status, "SetupExperiment")
         self.check(self._enter_initialization(self._pointer), "EnterInitializationMode")
 
     def take_step(self, status: int) -> int:

@@ -85,11 +85,12 @@ class Instance3(Instance):
         outputs.append(ctypes.byref(self._last_time))
         self._do_step = self._bound("DoStep", self._step_time, self._step_size, c_bool(False), *outputs)
 
-    def enter_initialization(self, start_time: float) -> None:
-        """Enter initialization mode at `start_time`, s."""
+    def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
+        """Enter initialization mode at `start_time`, s, with a relative tolerance; None: the FMU's own."""
         self.time = start_time
-        no, zero = c_bool(False), c_double(0.0)
-        status = self._enter_initialization(self._pointer, no, zero, c_double(start_time), no, zero)
+        given = (c_bool(tolerance is not None), c_double(tolerance or 0.0))
+        no_end = (c_bool(False), c_double(0.0))
+        status = self._enter_initialization(self._pointer, *given, c_double(start_time), *no_end)
         self.check(status, "EnterInitializationMode")
 
     def take_step(self, status: int) -> int:

@@ -140,7 +140,7 @@ class Component:
             self.instance.reset()
         for name, value in {**self.spec.parameters, **values}.items():
             self._set_start(name, value)
-        self.instance.enter_initialization(start_time)
+        self.instance.enter_initialization(start_time, self.spec.tolerance)
 
     def _set_start(self, name: str, value: Value) -> None:
         variable = self.variables[name]

@@ -34,18 +34,21 @@ class ComponentSpec:
         Its FMU file.
     parameters : mapping of str to number, bool or str
         Start values by variable name; enumerations by number or by item name.
+    tolerance : float or None
+        Relative tolerance of the solver inside the FMU; None: the FMU's own.
     """
 
     name: str
     fmu: Path
     parameters: Mapping[str, float | int | bool | str] = field(default_factory=dict)
+    tolerance: float | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         package = package_folder()
         if self.fmu.is_relative_to(package):
             # Another machine may have the package elsewhere.
             return _shipped, (self.name, self.fmu.relative_to(package), self.parameters)
-        return ComponentSpec, (self.name, self.fmu, self.parameters)
+        return ComponentSpec, (self.name, self.fmu, self.parameters, self.tolerance)
 
 
 def _shipped(name: str, place: Path, parameters: Mapping[str, float | int | bool | str]) -> ComponentSpec:

@@ -8,7 +8,7 @@ from pathlib import Path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.parameters import FMU_NAMES, exported_floats, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 
 
@@ -67,7 +67,7 @@ def export_scene(
         output,
         contacts=len(scene.stops),
         fmi=fmi,
-        starts={**float_parameters(scene, None), **integer_parameters(scene)},
+        starts={**exported_floats(scene), **integer_parameters(scene)},
         full=full,
         external=external,
         enumerations=enumerations,

@@ -62,6 +62,19 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
     return parameters
 
 
+def exported_floats(scene: Scene) -> dict[str, float]:
+    """Return the real parameters of the body's FMU in other tools, which know nothing of the scene.
+
+    They are `float_parameters`, but for a base that moves under an oscillator or a chain. A run gives such a body
+    the inertial force, and adds the base to the accelerations itself; an export has the base.
+    """
+    parameters, forcing = float_parameters(scene, None), scene.forcing
+    if forcing is None or forcing.kind != "base_acceleration" or isinstance(scene.body, BeamBody):
+        return parameters
+    forces = [name for name in parameters if name.startswith("forcing.amplitude")]
+    return parameters | dict.fromkeys(forces, 0.0) | {"forcing.base_acceleration": forcing.scalar_amplitude}
+
+
 def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
     """Return the numbers of a table of a scene by the names that its fields say they have in the FMU, SI.
 

@@ -102,6 +102,11 @@ def export_system(
             f"{', '.join(springs)}: each gain is a component; a tool that exchanges values once a step answers one "
             f"step later through it than with {option('gains')} transformation"
         )
+    for component in general.components:
+        if component.tolerance is not None:
+            note(
+                f"component.{component.name}.tolerance: a system has no word for it: its FMU runs with its own"
+            )
     for name in parse_toml(scene.text).keys() - {*OWN_TABLES, *ABOUT_A_RUN}:
         note(f"[[{name}]] travels in an annotation: other tools run the system without it")
     return target

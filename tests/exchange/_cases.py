@@ -2,70 +2,165 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+import tempfile
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from xarray import Dataset
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.run.export import export_scene
+from vibroimpact.orchestrator.run.parameters import FMU_NAMES, exported_floats, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.keys import dataset_name
 
 RATE = 512.0
 """Samples per second: a step has no rounding, neither in binary nor in the nanoseconds that libcosim counts."""
 
 COUNT = 4000
-OUTPUTS = ("displacement", "velocity")
 
 Rows = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A body with stops.
+
+    Attributes
+    ----------
+    tables : mapping of str to table
+        The scene without its record.
+    rate : float
+        Steps per second.
+    count : int
+        Steps.
+    """
+
+    tables: dict[str, Any]
+    rate: float = RATE
+    count: int = COUNT
+
+
+@dataclass(frozen=True, slots=True)
+class Exchanged:
+    """An FMU, and what it does by our own run.
+
+    Attributes
+    ----------
+    path : Path
+        The FMU.
+    outputs : tuple of str
+        All its outputs.
+    step : float
+        Communication step, s.
+    rows : ndarray, shape (step, output)
+        The outputs after each step.
+    smooth : tuple of str
+        The outputs that an integrator gives as well: the continuous ones.
+    quiet : ndarray of bool, shape (step,)
+        Steps with no event of a contact nearer than two steps.
+    """
+
+    path: Path
+    outputs: tuple[str, ...]
+    step: float
+    rows: Rows
+    smooth: tuple[str, ...] = ()
+    quiet: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+
+    def integrated(self, count: int) -> Exchanged:
+        """Return what an integrator is compared with: the smooth outputs of the first steps."""
+        columns = [self.outputs.index(name) for name in self.smooth]
+        return replace(self, outputs=self.smooth, rows=self.rows[:count, columns], quiet=self.quiet[:count])
+
 
 STOPS = [
     {"position": 0.1, "law": "restitution", "restitution": 0.6},
     {"position": -0.15, "side": "lower", "law": "kelvin_voigt", "stiffness": 2e3, "damping": 1.0},
 ]
-BODIES: dict[str, dict[str, Any]] = {
-    "oscillator": {
-        "body": {"mass": 2.0, "stiffness": 8.0, "damping_ratio": 0.02},
-        "forcing": {"amplitude": 3.0, "angular_frequency": 1.7},
-        "stop": STOPS,
-    },
-    "chain of 3": {
-        "body": {"kind": "chain", "masses": [1.0, 2.0, 1.5], "stiffnesses": [40.0, 20.0, 30.0]},
-        "forcing": {"amplitude": [0.0, 2.0, 1.0], "angular_frequency": 2.0},
-        "stop": [{**stop, "mass": 2} for stop in STOPS],
-    },
-    "beam of 4 modes with a stop": {
-        "body": {
-            "kind": "beam",
-            "modes": 4,
-            "length": 0.25,
-            "youngs_modulus": 7e10,
-            "density": 2700.0,
-            "width": 0.02,
-            "thickness": 0.002,
-            "damping_ratio": 0.02,
+OSCILLATOR = {"mass": 2.0, "stiffness": 8.0, "damping_ratio": 0.02}
+CHAIN = {"kind": "chain", "masses": [1.0, 2.0, 1.5], "stiffnesses": [40.0, 20.0, 30.0]}
+BEAM = {
+    "kind": "beam",
+    "modes": 4,
+    "length": 0.25,
+    "youngs_modulus": 7e10,
+    "density": 2700.0,
+    "width": 0.02,
+    "thickness": 0.002,
+    "damping_ratio": 0.02,
+}
+BEAM_STOP = {"position": 0.004, "law": "restitution", "restitution": 0.6}
+CHATTER = {"position": 0.0, "law": "restitution", "restitution": 0.7}
+SHAKEN = "base_acceleration"
+MILLISECONDS = 1000.0
+"""Samples per second whose step has a rounding in binary."""
+LONG = 10_000
+
+CASES = {
+    "oscillator": Case(
+        {"body": OSCILLATOR, "forcing": {"amplitude": 3.0, "angular_frequency": 1.7}, "stop": STOPS}
+    ),
+    "chain of 3": Case(
+        {
+            "body": CHAIN,
+            "forcing": {"amplitude": [0.0, 2.0, 1.0], "angular_frequency": 2.0},
+            "stop": [{**stop, "mass": 2} for stop in STOPS],
+        }
+    ),
+    "beam of 4 modes with a stop": Case(
+        {"body": BEAM, "forcing": {"amplitude": 0.5, "angular_frequency": 150.0}, "stop": [BEAM_STOP]}
+    ),
+    "oscillator, shaken base": Case(
+        {
+            "body": OSCILLATOR,
+            "forcing": {"kind": SHAKEN, "amplitude": 1.5, "angular_frequency": 1.7},
+            "stop": STOPS,
         },
-        "forcing": {"amplitude": 0.5, "angular_frequency": 150.0},
-        "stop": [{"position": 0.004, "law": "restitution", "restitution": 0.6}],
-    },
+        MILLISECONDS,
+        LONG,
+    ),
+    "chain, shaken base": Case(
+        {
+            "body": CHAIN,
+            "forcing": {"kind": SHAKEN, "amplitude": 1.0, "angular_frequency": 2.0},
+            "stop": [{**stop, "mass": 2} for stop in STOPS],
+        },
+        MILLISECONDS,
+    ),
+    "beam, shaken base": Case(
+        {
+            "body": BEAM,
+            "forcing": {"kind": SHAKEN, "amplitude": 40.0, "angular_frequency": 150.0},
+            "stop": [BEAM_STOP],
+        },
+        MILLISECONDS,
+        500,
+    ),
+    "chatter": Case(
+        {
+            "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05, "displacement_start": -0.1},
+            "forcing": {"amplitude": 1.0, "angular_frequency": 0.2},
+            "stop": [CHATTER],
+        },
+        MILLISECONDS,
+        LONG,
+    ),
 }
 IMPACT_STOP, REPLAY = "impact stop", "replay"
-NAMES = (*BODIES, IMPACT_STOP, REPLAY)
-ANSWERS = ("applied_force", "applied_stiffness", "applied_damping")
-PLAYED = ("base", "base_rate", "sparse", "sparse_rate")
+NAMES = (*CASES, IMPACT_STOP, REPLAY)
 
 
-def outputs(name: str) -> tuple[str, ...]:
-    """Return the outputs that are compared."""
-    return {IMPACT_STOP: ANSWERS, REPLAY: PLAYED}.get(name, OUTPUTS)
-
-
-def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> tuple[Path, Rows]:
+def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> Exchanged:
     """Return the FMU of a case, and what its outputs are after each step by our own run."""
     path = folder / "exported.fmu"
     if name == REPLAY:
@@ -78,17 +173,103 @@ def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> tupl
             "displacement": 0.01,
             "velocity": 0.5,
         }
-        answer = [1e4 * 0.01 + 3.0 * 0.5, 1e4, 3.0]
         export_fmu("impact_stop", path, fmi=fmi, starts=starts, platform=platform)
-        return path, np.tile(answer, (COUNT, 1))
-    scene = _scene(BODIES[name])
-    run_scene(scene, folder / "run.nc")
-    samples = open_dataset(folder / "run.nc").vibroimpact.samples()
-    rows = np.column_stack([samples[output].values for output in OUTPUTS])[1 : COUNT + 1]
-    return export_scene(scene, path, fmi=fmi, platform=platform), rows
+        answer = {
+            "applied_force": 1e4 * 0.01 + 3.0 * 0.5,
+            "applied_stiffness": 1e4,
+            "applied_damping": 3.0,
+            "applied_restitution": 1.0,
+        }
+        names = tuple(outputs_of(path))
+        return Exchanged(path, names, 1.0 / RATE, np.tile([answer[name] for name in names], (COUNT, 1)))
+    return _body(name, fmi, path, platform)
 
 
-def _replay(fmi: str, path: Path, platform: str | None) -> tuple[Path, Rows]:
+def outputs_of(path: Path) -> dict[str, str]:
+    """Return the outputs of an FMU, each with its variability."""
+    variables = read_description(path).modelVariables
+    return {v.name: v.variability for v in variables if v.causality == "output"}
+
+
+def _body(name: str, fmi: str, path: Path, platform: str | None) -> Exchanged:
+    ours, case = our_run(name), CASES[name]
+    export_scene(ours.scene, path, fmi=fmi, platform=platform)
+    outputs = outputs_of(path)
+    smooth = tuple(output for output, variability in outputs.items() if variability == "continuous")
+    rows = np.column_stack([ours.found[output] for output in outputs])
+    return Exchanged(path, tuple(outputs), 1.0 / case.rate, rows, smooth, ours.quiet)
+
+
+@dataclass(frozen=True, slots=True)
+class OurRun:
+    """Our own run of a case: the scene, each output of its FMU after each step, its impacts, and its quiet steps."""
+
+    scene: Scene
+    found: dict[str, Rows]
+    impacts: Dataset
+    quiet: NDArray[np.bool_]
+
+
+@cache
+def our_run(name: str) -> OurRun:
+    """Return our own run of a case, which is made once."""
+    case = CASES[name]
+    period = 2.0 * np.pi / case.tables["forcing"]["angular_frequency"]
+    record = {"recorded_periods": int(np.ceil((case.count + 1) / case.rate / period))}
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        scene = Scene.from_dict({**case.tables, "record": record})
+        outputs = outputs_of(export_scene(scene, folder / "outputs.fmu"))
+        sampled = {output: series for output in outputs if (series := _series_of(output))}
+        times = {"rate": case.rate, "variables": list(sampled.values())}
+        run_scene(
+            Scene.from_dict({**case.tables, "record": {**record, "time_series": times}}), folder / "run.nc"
+        )
+        with open_dataset(folder / "run.nc") as run:
+            found = {output: run[dataset_name(series)].values for output, series in sampled.items()}
+            impacts, quiet = run.vibroimpact.impacts().load(), _quiet(run, case)
+        found |= _by_importer(scene, [output for output in outputs if output not in sampled], case, folder)
+    steps = slice(1, case.count + 1)
+    return OurRun(scene, {output: values[steps] for output, values in found.items()}, impacts, quiet)
+
+
+def _series_of(name: str) -> str:
+    """Return what a time series calls an output of a body; empty where it has none of it."""
+    if match := re.fullmatch(r"contact\[(\d+)\]\.(displacement|velocity|force)", name):
+        return f"contact_{match[2]}[{match[1]}]"
+    plain = r"(displacement|velocity|acceleration)(\[\d+\])?|energy\..*|modal_(displacement|velocity)\[\d+\]"
+    return name if re.fullmatch(plain, name) else ""
+
+
+def _by_importer(scene: Scene, names: list[str], case: Case, folder: Path) -> dict[str, Rows]:
+    """Return the outputs that no time series has, counts and impulses of contacts, by a run of our importer."""
+    parameters = {**exported_floats(scene), **integer_parameters(scene)}
+    tables = {
+        "component": {"body": {"fmu": FMU_NAMES[scene.body.kind], "parameters": parameters}},
+        "record": {
+            "recorded_time": (case.count + 1) / case.rate,
+            "variables": [f"body.{name}" for name in names],
+            "rate": case.rate,
+        },
+        "execution": {"how": "coupled", "macro_step": 1.0 / case.rate},
+    }
+    run_scene(Scene.from_dict(tables), folder / "importer.nc")
+    with open_dataset(folder / "importer.nc") as run:
+        return {name: run[dataset_name(f"body.{name}")].values for name in names}
+
+
+def _quiet(run: Dataset, case: Case) -> NDArray[np.bool_]:
+    impacts, sticks = run.vibroimpact.impacts(), run.vibroimpact.sticks()
+    begin, end = impacts["impact_time"].values, sticks["stick_end"].values
+    events = np.concatenate([begin, begin + impacts["impact_duration"].values, end])
+    near = np.floor(events[np.isfinite(events)] * case.rate).astype(int)
+    loud = np.unique(near[:, None] + np.arange(-2, 3))
+    quiet = np.ones(case.count, bool)
+    quiet[loud[(loud >= 0) & (loud < case.count)]] = False
+    return quiet
+
+
+def _replay(fmi: str, path: Path, platform: str | None) -> Exchanged:
     """Return an FMU of noise at twice the rate with a gap, and of a slow channel on instants of its own."""
     random = np.random.default_rng(13)
     times = np.arange(2 * COUNT + 2) / (2.0 * RATE)
@@ -107,8 +288,17 @@ def _replay(fmi: str, path: Path, platform: str | None) -> tuple[Path, Rows]:
     inside = (at >= instants[0]) & (at < instants[-1])
     segment = np.clip(np.searchsorted(instants, at, "right") - 1, 0, len(instants) - 2)
     slopes = np.where(inside, (np.diff(slow) / np.diff(instants))[segment], 0.0)
-    rows = (bridged[now], (np.diff(bridged) * 2.0 * RATE)[now], np.interp(at, instants, slow), slopes)
-    return build_replay(signals, path, fmi=fmi, platform=platform), np.column_stack(rows)
+    played = {
+        "base": bridged[now],
+        "base_valid": good[now],
+        "base_rate": (np.diff(bridged) * 2.0 * RATE)[now],
+        "sparse": np.interp(at, instants, slow),
+        "sparse_valid": inside,
+        "sparse_rate": slopes,
+    }
+    build_replay(signals, path, fmi=fmi, platform=platform)
+    names = tuple(outputs_of(path))
+    return Exchanged(path, names, 1.0 / RATE, np.column_stack([played[name] for name in names]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +362,14 @@ PAIRS = {
         units="N/m",
     ),
 }
-PAIR_OUTPUTS = tuple(f"{name}.{output}" for name in "ab" for output in OUTPUTS)
+# accelerations and forces follow inputs at once, so that it depends on a tool whether they are those before an exchange
+STATE_OUTPUTS = ("displacement", "velocity", "energy.kinetic", "energy.potential")
+AT_STOPS = ("displacement", "velocity", "impulse", "total_impulse", "last_velocity")
+PAIR_OUTPUTS = tuple(
+    f"{name}.{output}"
+    for name in "ab"
+    for output in (*STATE_OUTPUTS, *(f"contact[{k}].{at}" for k in (1, 2) for at in AT_STOPS))
+)
 
 
 def made_pair(name: str, fmi: str, folder: Path) -> tuple[dict[str, Path], Rows]:
@@ -189,9 +386,7 @@ def made_pair(name: str, fmi: str, folder: Path) -> tuple[dict[str, Path], Rows]
     )
     run_scene(scene, folder / "pair.nc")
     samples = open_dataset(folder / "pair.nc").vibroimpact.samples()
-    rows = np.column_stack([samples[output.replace(".", "_")].values for output in PAIR_OUTPUTS])[
-        1 : COUNT + 1
-    ]
+    rows = np.column_stack([samples[dataset_name(output)].values for output in PAIR_OUTPUTS])[1 : COUNT + 1]
     still = {"displacement_start": 0.0}  # else an export that nothing moves starts displaced
     fmus = {
         one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=still | parameters)
@@ -200,15 +395,7 @@ def made_pair(name: str, fmi: str, folder: Path) -> tuple[dict[str, Path], Rows]
     return fmus, rows
 
 
-def _scene(tables: dict[str, Any]) -> Scene:
-    period = 2.0 * np.pi / tables["forcing"]["angular_frequency"]
-    record = {
-        "recorded_periods": int(np.ceil((COUNT + 1) / RATE / period)),
-        "time_series": {"rate": RATE, "variables": list(OUTPUTS)},
-    }
-    return Scene.from_dict({**tables, "record": record})
-
-
 def difference(rows: Rows, expected: Rows) -> float:
-    """Return the largest difference, as a part of the largest value of the same output."""
-    return float(np.max(np.abs(rows - expected).max(axis=0) / np.abs(expected).max(axis=0)))
+    """Return the largest difference, as a part of the largest value of the same output, and of 1 where that is 0."""
+    largest = np.abs(expected).max(axis=0)
+    return float(np.max(np.abs(rows - expected).max(axis=0) / np.where(largest > 0.0, largest, 1.0)))

@@ -2,9 +2,10 @@
  * Loads the library of a co-simulation FMU and prints what its outputs are after each step: for machines that have no
  * other tool, and for those that are pretended (wine, qemu-user).
  *
- *     host 2|3 LIBRARY TOKEN RESOURCES STEP COUNT REFERENCE...
+ *     host 2|3 LIBRARY TOKEN RESOURCES STEP COUNT OUTPUT...
  *
- * RESOURCES is a URI for FMI 2.0, a folder for FMI 3.0.
+ * RESOURCES is a URI for FMI 2.0, a folder for FMI 3.0. OUTPUT is a letter and a value reference: r17 is a real number, i an
+ * integer, b true or false.
  */
 #include <stdarg.h>
 #include <stdbool.h>
@@ -21,9 +22,14 @@
 #include "fmi2FunctionTypes.h"
 #include "fmi3FunctionTypes.h"
 
-enum { FIRST_REFERENCE = 7, MOST_OUTPUTS = 16 };
+enum { FIRST_OUTPUT = 7, MOST_OUTPUTS = 128 };
 
 typedef void (*function)(void);
+
+typedef struct {
+    char kind;
+    unsigned int reference;
+} output;
 
 static const char *library_path;
 
@@ -83,7 +89,40 @@ static void say3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3Str
     fprintf(stderr, "status %d: %s\n", (int)status, message);
 }
 
-static void run2(char **given, double step, long steps, const unsigned int references[], size_t count)
+static void read2(fmi2Component instance, const output *wanted, double *value)
+{
+    int whole = 0;
+    if (wanted->kind == 'i') {
+        expect((int)((fmi2GetIntegerTYPE *)find("fmi2GetInteger"))(instance, &wanted->reference, 1, &whole),
+               "fmi2GetInteger");
+        *value = whole;
+    } else if (wanted->kind == 'b') {
+        expect((int)((fmi2GetBooleanTYPE *)find("fmi2GetBoolean"))(instance, &wanted->reference, 1, &whole),
+               "fmi2GetBoolean");
+        *value = whole != fmi2False ? 1.0 : 0.0;
+    } else {
+        expect((int)((fmi2GetRealTYPE *)find("fmi2GetReal"))(instance, &wanted->reference, 1, value), "fmi2GetReal");
+    }
+}
+
+static void read3(fmi3Instance instance, const output *wanted, double *value)
+{
+    if (wanted->kind == 'i') {
+        fmi3Int64 whole = 0;
+        expect((int)((fmi3GetInt64TYPE *)find("fmi3GetInt64"))(instance, &wanted->reference, 1, &whole, 1), "fmi3GetInt64");
+        *value = (double)whole;
+    } else if (wanted->kind == 'b') {
+        fmi3Boolean truth = false;
+        expect((int)((fmi3GetBooleanTYPE *)find("fmi3GetBoolean"))(instance, &wanted->reference, 1, &truth, 1),
+               "fmi3GetBoolean");
+        *value = truth ? 1.0 : 0.0;
+    } else {
+        expect((int)((fmi3GetFloat64TYPE *)find("fmi3GetFloat64"))(instance, &wanted->reference, 1, value, 1),
+               "fmi3GetFloat64");
+    }
+}
+
+static void run2(char **given, double step, long steps, const output wanted[], size_t count)
 {
     const fmi2CallbackFunctions callbacks = {say2, calloc, free, NULL, NULL};
     const fmi2Component instance = ((fmi2InstantiateTYPE *)find("fmi2Instantiate"))(
@@ -96,18 +135,19 @@ static void run2(char **given, double step, long steps, const unsigned int refer
     expect((int)((fmi2ExitInitializationModeTYPE *)find("fmi2ExitInitializationMode"))(instance),
            "fmi2ExitInitializationMode");
     fmi2DoStepTYPE *do_step = (fmi2DoStepTYPE *)find("fmi2DoStep");
-    fmi2GetRealTYPE *get = (fmi2GetRealTYPE *)find("fmi2GetReal");
     for (long k = 0; k < steps; k++) {
         double values[MOST_OUTPUTS];
         expect((int)do_step(instance, (double)k * step, step, fmi2True), "fmi2DoStep");
-        expect((int)get(instance, references, count, values), "fmi2GetReal");
+        for (size_t i = 0; i < count; i++) {
+            read2(instance, &wanted[i], &values[i]);
+        }
         print_row(values, count);
     }
     expect((int)((fmi2TerminateTYPE *)find("fmi2Terminate"))(instance), "fmi2Terminate");
     ((fmi2FreeInstanceTYPE *)find("fmi2FreeInstance"))(instance);
 }
 
-static void run3(char **given, double step, long steps, const unsigned int references[], size_t count)
+static void run3(char **given, double step, long steps, const output wanted[], size_t count)
 {
     const fmi3Instance instance = ((fmi3InstantiateCoSimulationTYPE *)find("fmi3InstantiateCoSimulation"))(
         "host", given[3], given[4], false, false, false, false, NULL, 0, NULL, say3, NULL);
@@ -118,12 +158,13 @@ static void run3(char **given, double step, long steps, const unsigned int refer
     expect((int)((fmi3ExitInitializationModeTYPE *)find("fmi3ExitInitializationMode"))(instance),
            "fmi3ExitInitializationMode");
     fmi3DoStepTYPE *do_step = (fmi3DoStepTYPE *)find("fmi3DoStep");
-    fmi3GetFloat64TYPE *get = (fmi3GetFloat64TYPE *)find("fmi3GetFloat64");
     for (long k = 0; k < steps; k++) {
         double values[MOST_OUTPUTS], last;
         bool event, ends, early;
         expect((int)do_step(instance, (double)k * step, step, true, &event, &ends, &early, &last), "fmi3DoStep");
-        expect((int)get(instance, references, count, values, count), "fmi3GetFloat64");
+        for (size_t i = 0; i < count; i++) {
+            read3(instance, &wanted[i], &values[i]);
+        }
         print_row(values, count);
     }
     expect((int)((fmi3TerminateTYPE *)find("fmi3Terminate"))(instance), "fmi3Terminate");
@@ -132,18 +173,19 @@ static void run3(char **given, double step, long steps, const unsigned int refer
 
 int main(int count, char **given)
 {
-    if (count <= FIRST_REFERENCE || count > FIRST_REFERENCE + MOST_OUTPUTS) {
-        fprintf(stderr, "usage: host 2|3 LIBRARY TOKEN RESOURCES STEP COUNT REFERENCE...\n");
+    if (count <= FIRST_OUTPUT || count > FIRST_OUTPUT + MOST_OUTPUTS) {
+        fprintf(stderr, "usage: host 2|3 LIBRARY TOKEN RESOURCES STEP COUNT OUTPUT...\n");
         return 2;
     }
     library_path = given[2];
-    unsigned int references[MOST_OUTPUTS];
-    const size_t outputs = (size_t)(count - FIRST_REFERENCE);
+    output wanted[MOST_OUTPUTS];
+    const size_t outputs = (size_t)(count - FIRST_OUTPUT);
     for (size_t i = 0; i < outputs; i++) {
-        references[i] = (unsigned int)strtoul(given[FIRST_REFERENCE + i], NULL, 10);
+        wanted[i].kind = given[FIRST_OUTPUT + i][0];
+        wanted[i].reference = wanted[i].kind != '\0' ? (unsigned int)strtoul(given[FIRST_OUTPUT + i] + 1, NULL, 10) : 0;
     }
     const double step = strtod(given[5], NULL);
     const long steps = strtol(given[6], NULL, 10);
-    (strcmp(given[1], "2") == 0 ? run2 : run3)(given, step, steps, references, outputs);
+    (strcmp(given[1], "2") == 0 ? run2 : run3)(given, step, steps, wanted, outputs);
     return 0;
 }

@@ -15,11 +15,11 @@ from urllib.parse import quote
 import numpy as np
 
 from exchange._cases import Rows
+from exchange._single import described
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.packaging.build import fmi_headers
 from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, find_compiler, zig_compiler
-from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.platform_names import TARGETS, Platform, this_platform
 
 SOURCE = Path(__file__).with_name("_host.c")
@@ -93,7 +93,7 @@ class Machine:
     def run(self, host: Path, fmu: Path, names: Sequence[str], step: float, count: int) -> Rows:
         """Return the outputs of an FMU after each step, shape (count, len(names))."""
         unpacked = unpack(fmu)
-        references = {v.name: str(v.valueReference) for v in read_description(fmu).modelVariables}
+        references = {name: f"{kind[0]}{number}" for name, (number, kind) in described(str(fmu)).items()}
         given = [unpacked.fmi_version[0], *self._places(unpacked), repr(step), str(count)]
         command = [
             *([self.runner] if self.runner else []),

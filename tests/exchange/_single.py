@@ -35,25 +35,44 @@ def libcosim(asked: Request) -> Rows:
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    references = value_references(asked["fmu"])
+    variables = described(asked["fmu"])
     execution = CosimExecution.from_step_size(round(asked["step"] * 1e9))
     slave = CosimLocalSlave(asked["fmu"], "body")
     index = execution.add_local_slave(slave)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
-    wanted = [references[name] for name in asked["names"]]
+    readers = {
+        "real": observer.last_real_values,
+        "integer": observer.last_integer_values,
+        "boolean": observer.last_boolean_values,
+    }
+    kinds = [variables[name][1] for name in asked["names"]]
+    references = {
+        kind: [variables[name][0] for name in asked["names"] if variables[name][1] == kind]
+        for kind in dict.fromkeys(kinds)
+    }
     rows = []
     for _ in range(asked["count"]):
         execution.step()
-        rows.append([float(value) for value in observer.last_real_values(index, wanted)])
+        found = {kind: iter(readers[kind](index, wanted)) for kind, wanted in references.items()}
+        rows.append([float(next(found[kind])) for kind in kinds])
     return rows
+
+
+KINDS = {"Float64": "real", "Real": "real", "Int64": "integer", "Integer": "integer", "Boolean": "boolean"}
+
+
+def described(fmu: str) -> dict[str, tuple[int, str]]:
+    """Return reference and kind of each of an FMU's variables: real, integer or boolean; others are left out."""
+    from fmpy import read_model_description
+
+    variables = read_model_description(fmu).modelVariables
+    return {v.name: (v.valueReference, KINDS[v.type]) for v in variables if v.type in KINDS}
 
 
 def value_references(fmu: str) -> dict[str, int]:
     """Return the references of an FMU's variables."""
-    from fmpy import read_model_description
-
-    return {v.name: v.valueReference for v in read_model_description(fmu).modelVariables}
+    return {name: reference for name, (reference, _) in described(fmu).items()}
 
 
 def ecos(asked: Request) -> Rows:
@@ -61,14 +80,20 @@ def ecos(asked: Request) -> Rows:
     load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
 
-    rows = []
+    rows, kinds = [], described(asked["fmu"])
     with EcosSimulationStructure() as structure:
         structure.add_model("body", asked["fmu"])
         with EcosSimulation(structure=structure, step_size=asked["step"]) as simulation:
             simulation.init()
+            readers = {
+                "real": simulation.get_real,
+                "integer": simulation.get_integer,
+                "boolean": simulation.get_bool,
+            }
+            wanted = [(readers[kinds[name][1]], f"body::{name}") for name in asked["names"]]
             for _ in range(asked["count"]):
                 simulation.step()
-                rows.append([float(simulation.get_real(f"body::{name}")) for name in asked["names"]])
+                rows.append([float(read(name)) for read, name in wanted])
     return rows
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from exchange._cases import COUNT, RATE, difference, made, outputs
+from exchange._cases import difference, made
 from exchange._machines import LIBRARIES, HostFailedError, Machine
 from vibroimpact.fmus.packaging.platform_names import TARGETS, Platform, this_platform
 
@@ -28,16 +28,16 @@ def host(here: Machine, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_plain_c_program_runs_an_export_as_our_own_run(
     tmp_path: Path, here: Machine, host: Path, fmi: str
 ) -> None:
-    path, expected = made("oscillator", fmi, tmp_path)
-    rows = here.run(host, path, outputs("oscillator"), 1.0 / RATE, COUNT)
-    assert rows.shape == expected.shape
-    assert difference(rows, expected) <= 1e-9
+    it = made("oscillator, shaken base", fmi, tmp_path)
+    rows = here.run(host, it.path, it.outputs, it.step, len(it.rows))
+    assert rows.shape == it.rows.shape
+    assert difference(rows, it.rows) <= 1e-9
 
 
 def test_the_program_says_what_a_library_has_not(tmp_path: Path, here: Machine, host: Path) -> None:
-    path, _ = made("impact stop", "3.0", tmp_path)
+    it = made("impact stop", "3.0", tmp_path)
     with pytest.raises(HostFailedError, match="fmi3DoStep: expected status 0, got 3"):
-        here.run(host, path, outputs("impact stop"), -1.0, 1)
+        here.run(host, it.path, it.outputs, -1.0, 1)
 
 
 def test_a_machine_whose_programs_cannot_run_here_says_why(

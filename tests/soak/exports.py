@@ -25,7 +25,7 @@ SAMPLES = 200
 MOST_IMPACTS = 6
 """Impacts up to which two runs that step in other places are compared: beyond, rounding grows in chaotic motion."""
 TOLERANCE = 1e-7
-OUTPUTS = ("displacement", "velocity")
+OUTPUTS = ("displacement", "velocity", "acceleration")
 
 
 def check(seed: int) -> str | None:
@@ -88,10 +88,14 @@ def drawn_tables(draw: random.Random) -> dict[str, Any]:
     duration = (SAMPLES + 2) / rate
     if draw.random() < 0.7:
         angular_frequency = slowest * draw.uniform(0.3, 2.0)
-        amplitude: Any = scale["force"] * draw.uniform(0.2, 2.0)
-        if kind == "chain":
-            amplitude = [amplitude * draw.choice((0.0, 1.0)) for _ in body["masses"]]
+        amplitude = scale["force"] * draw.uniform(0.2, 2.0)
+        bending = scale["length"] * slowest**2
         tables["forcing"] = {"amplitude": amplitude, "angular_frequency": angular_frequency}
+        if draw.random() < 0.4:
+            # an acceleration that bends the body by about its length scale
+            tables["forcing"] |= {"kind": "base_acceleration", "amplitude": bending * draw.uniform(0.2, 2.0)}
+        elif kind == "chain":
+            tables["forcing"]["amplitude"] = [amplitude * draw.choice((0.0, 1.0)) for _ in body["masses"]]
         record["recorded_periods"] = math.ceil(duration * angular_frequency / (2.0 * math.pi)) + 1
     else:
         record["recorded_time"] = duration

@@ -23,6 +23,12 @@ macro_step = 0.1
 
 OF_COMPONENTS = [
     (
+        'fmi = "2.0"',
+        "tolerance = 1e-6",
+        'component.b.tolerance: expected tolerance beside an FMU file only, got tolerance = 1e-06 beside "Oscillator". '
+        "It is exact, or has a parameter contact_tolerance: remove tolerance.",
+    ),
+    (
         'gain_unit = "N/m"\n',
         "",
         "connection[1]: expected the same unit at both ends, got m (b.displacement) to N (a.force). "

@@ -40,6 +40,7 @@ typedef struct {
     bool (*set_time)(void *self, double time);
     void (*get_states)(void *self, double states[]);
     void (*set_states)(void *self, const double states[]);
+    bool (*states_are_finite)(const void *self);
     void (*get_nominals)(void *self, double nominals[]);
     void (*get_derivatives)(void *self, double derivatives[]);
     void (*get_indicators)(void *self, double indicators[]);

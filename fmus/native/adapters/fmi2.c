@@ -116,9 +116,8 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     if (it == NULL || !vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)) {
         return fmi2Error;
     }
-    it->start_time = startTime;
-    it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
-    return fmi2OK;
+    const double stop = stopTimeDefined ? stopTime : HUGE_VAL;
+    return vi_instance_set_experiment(it, "fmi2SetupExperiment", startTime, stop) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)

@@ -106,7 +106,8 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
     return fmi2OK;
 }
 
-#define READ(NAME, GET, STATES)                                                                                     \
+/* `COMPUTED`: values that follow from the states, which must be finite; states and nominal values are as they are. */
+#define READ(NAME, GET, STATES, COMPUTED)                                                                            \
     fmi2Status NAME(fmi2Component c, fmi2Real values[], size_t count)                                                \
     {                                                                                                                \
         vi_instance *it = c;                                                                                         \
@@ -114,10 +115,11 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
             return fmi2Error;                                                                                        \
         }                                                                                                            \
         exchange()->GET(it->self, values);                                                                           \
-        return fmi2OK;                                                                                               \
+        const bool good = !(COMPUTED) || vi_instance_is_finite(it, #NAME, values, count);                            \
+        return good ? fmi2OK : fmi2Discard;                                                                          \
     }
 
-READ(fmi2GetDerivatives, get_derivatives, true)
-READ(fmi2GetEventIndicators, get_indicators, false)
-READ(fmi2GetContinuousStates, get_states, true)
-READ(fmi2GetNominalsOfContinuousStates, get_nominals, true)
+READ(fmi2GetDerivatives, get_derivatives, true, true)
+READ(fmi2GetEventIndicators, get_indicators, false, true)
+READ(fmi2GetContinuousStates, get_states, true, false)
+READ(fmi2GetNominalsOfContinuousStates, get_nominals, true, false)

@@ -157,13 +157,13 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 {
     UNUSED(toleranceDefined);
     UNUSED(tolerance);
+    static const char function[] = "fmi3EnterInitializationMode";
     vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, "fmi3EnterInitializationMode", VI_MODE_INSTANTIATED)) {
+    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_INSTANTIATED)
+        || !vi_instance_set_experiment(it, function, startTime, stopTimeDefined ? stopTime : HUGE_VAL)) {
         return fmi3Error;
     }
     it->mode = VI_MODE_INITIALIZATION;
-    it->start_time = startTime;
-    it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
     it->outputs_stale = true;
     return fmi3OK;
 }

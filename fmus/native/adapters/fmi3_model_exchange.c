@@ -82,7 +82,8 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
     return fmi3OK;
 }
 
-#define READ(NAME, GET, STATES)                                                                                     \
+/* `COMPUTED`: values that follow from the states, which must be finite; states and nominal values are as they are. */
+#define READ(NAME, GET, STATES, COMPUTED)                                                                            \
     fmi3Status NAME(fmi3Instance instance, fmi3Float64 values[], size_t count)                                       \
     {                                                                                                                \
         vi_instance *it = instance;                                                                                  \
@@ -90,7 +91,8 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
             return fmi3Error;                                                                                        \
         }                                                                                                            \
         exchange()->GET(it->self, values);                                                                           \
-        return fmi3OK;                                                                                               \
+        const bool good = !(COMPUTED) || vi_instance_is_finite(it, #NAME, values, count);                            \
+        return good ? fmi3OK : fmi3Discard;                                                                          \
     }
 #define COUNT(NAME, OF)                                                                                             \
     fmi3Status NAME(fmi3Instance instance, size_t *count)                                                            \
@@ -103,9 +105,9 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
         return fmi3OK;                                                                                               \
     }
 
-READ(fmi3GetContinuousStateDerivatives, get_derivatives, true)
-READ(fmi3GetEventIndicators, get_indicators, false)
-READ(fmi3GetContinuousStates, get_states, true)
-READ(fmi3GetNominalsOfContinuousStates, get_nominals, true)
+READ(fmi3GetContinuousStateDerivatives, get_derivatives, true, true)
+READ(fmi3GetEventIndicators, get_indicators, false, true)
+READ(fmi3GetContinuousStates, get_states, true, false)
+READ(fmi3GetNominalsOfContinuousStates, get_nominals, true, false)
 COUNT(fmi3GetNumberOfEventIndicators, indicators)
 COUNT(fmi3GetNumberOfContinuousStates, states)

@@ -208,6 +208,17 @@ bool vi_instance_expect_steps(vi_instance *instance, const char *function)
                                " states, or make one for co-simulation");
 }
 
+bool vi_instance_set_experiment(vi_instance *instance, const char *function, double start, double stop)
+{
+    if (stop < start || isnan(stop)) {
+        return vi_instance_fail(instance, function, "expected a stop time that is not before the start time %.17g s, got"
+                                " %.17g s", start, stop);
+    }
+    instance->start_time = start;
+    instance->stop_time = stop;
+    return true;
+}
+
 bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size)
 {
     const double stop = instance->stop_time;
@@ -237,8 +248,23 @@ bool vi_instance_initialize(vi_instance *instance, const char *function)
     return true;
 }
 
+bool vi_instance_is_finite(vi_instance *instance, const char *function, const double values[], size_t count)
+{
+    bool finite = component->exchange->states_are_finite(instance->self);
+    for (size_t i = 0; i < count; ++i) {
+        finite = finite && isfinite(values[i]);
+    }
+    if (!finite) {
+        warn(instance, function, "expected finite states, and finite values of them, got others. Try a shorter step");
+    }
+    return finite;
+}
+
 bool vi_instance_handle_event(vi_instance *instance, const char *function, bool *states_changed, bool *terminate)
 {
+    if (!component->exchange->states_are_finite(instance->self)) {
+        return vi_instance_fail(instance, function, "expected finite states, got others");
+    }
     instance->message[0] = '\0';
     instance->outputs_stale = true;
     return component->exchange->handle_event(instance->self, states_changed, terminate, instance->message)

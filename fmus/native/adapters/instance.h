@@ -67,6 +67,9 @@ bool vi_token_is_of_export(const char *token);
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
 
+/* Begin at `start` with this stop time, infinite where there is none; false after logging where it lies before `start`. */
+bool vi_instance_set_experiment(vi_instance *instance, const char *function, double start, double stop);
+
 /* Does a step from `time` by `size` end by the stop time, to rounding? If not, log it. */
 bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size);
 
@@ -84,6 +87,10 @@ bool vi_instance_expect_exchange(vi_instance *instance, const char *function, in
 
 /* Is it one of co-simulation? If not, log it. */
 bool vi_instance_expect_steps(vi_instance *instance, const char *function);
+
+/* Model exchange: are the states finite, and `values` that were computed from them? If not, log it: the importer can
+ * try a shorter step. */
+bool vi_instance_is_finite(vi_instance *instance, const char *function, const double values[], size_t count);
 
 /* Model exchange: resolve what happens at this instant. */
 bool vi_instance_handle_event(vi_instance *instance, const char *function, bool *states_changed, bool *terminate);

@@ -434,14 +434,6 @@ static void hold_inputs(beam *b)
     vi_structure_component_hold(&b->body, held, held_rate);
 }
 
-/* Of the input and of the forcing, m/s^2. */
-static double base_acceleration(const beam *b)
-{
-    const double input = vi_structure_component_base_acceleration(&b->body);
-    const bool forced = b->forcing_kind == FORCED_BY_BASE;
-    return forced ? input + b->forcing_amplitude * vi_structure_component_forcing(&b->body) : input;
-}
-
 static void drive(beam *b)
 {
     double force[VI_MODES];
@@ -479,7 +471,8 @@ static void update_outputs(void *self)
     refresh_inputs(b);
     b->time = vi_structure_component_time(&b->body);
     const vi_structure_component *body = &b->body;
-    const double base = base_acceleration(b);
+    const double moved = b->forcing_kind == FORCED_BY_BASE ? b->forcing_amplitude : 0.0;
+    const double base = vi_structure_component_base_acceleration(&b->body, moved);
     vi_structure_component_outputs(&b->body, base);
     for (int j = 0; j < b->modes; ++j) {
         b->modal_displacement[j] = body->state.q[j] / b->root_mass;

@@ -46,6 +46,12 @@ static void check_inputs(const chain *c, char *message)
     vi_check_each(message, vi_check_finite, "force_rate", c->force_rate, (int)c->masses);
 }
 
+static void check_forcing(const chain *c, char *message)
+{
+    vi_check_each(message, vi_check_finite, "forcing.amplitude", c->forcing_amplitude, (int)c->masses);
+    vi_check_finite(message, "forcing.base_acceleration", c->forcing_base_acceleration);
+}
+
 static void check_masses(const chain *c, char *message)
 {
     const int n = (int)c->masses;
@@ -54,7 +60,7 @@ static void check_masses(const chain *c, char *message)
     vi_check_each(message, vi_check_not_negative, "damping", c->parameter.damping, n);
     vi_check_not_negative(message, "far_stiffness", c->far_stiffness);
     vi_check_not_negative(message, "far_damping", c->far_damping);
-    vi_check_each(message, vi_check_finite, "forcing.amplitude", c->forcing_amplitude, n);
+    check_forcing(c, message);
     vi_check_each(message, vi_check_finite, "displacement_start", c->displacement_start, n);
     vi_check_each(message, vi_check_finite, "velocity_start", c->velocity_start, n);
 }
@@ -124,12 +130,16 @@ static bool find_modes(chain *c, vi_chain_modes *modes, char *message)
     return true;
 }
 
-/* Modal amplitudes of the harmonic force; a force of frequency 0 is constant. */
+/* Modal amplitudes of the harmonic force and of the base's inertial one; a force of frequency 0 is constant. */
 static void find_forces(const chain *c, double force[VI_MODES])
 {
+    double load[VI_MODES];
     const bool constant = c->body.forcing_angular_frequency == 0.0;
     const double share = constant ? cos(c->body.forcing_phase) : 1.0;
-    project(c, c->forcing_amplitude, force);
+    for (int i = 0; i < c->masses; ++i) {
+        load[i] = c->forcing_amplitude[i] - c->parameter.mass[i] * c->forcing_base_acceleration;
+    }
+    project(c, load, force);
     for (int j = 0; j < modes_of(c); ++j) {
         force[j] *= share;
     }
@@ -217,7 +227,7 @@ static void update_outputs(void *self)
     chain *c = self;
     refresh_inputs(c);
     c->time = vi_structure_component_time(&c->body);
-    const double base = vi_structure_component_base_acceleration(&c->body);
+    const double base = vi_structure_component_base_acceleration(&c->body, c->forcing_base_acceleration);
     vi_structure_component_outputs(&c->body, base);
     for (int i = 0; i < c->masses; ++i) {
         c->displacement[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.q);
@@ -254,7 +264,7 @@ static void was_set(void *self, uint32_t reference)
     chain *c = self;
     const size_t offset = vi_this_component.variables[reference].offset, first = offsetof(chain, forcing_amplitude);
     if ((offset >= first && offset < first + sizeof c->forcing_amplitude)
-        || reference == CHAIN_FORCING_ANGULAR_FREQUENCY) {
+        || reference == CHAIN_FORCING_BASE_ACCELERATION || reference == CHAIN_FORCING_ANGULAR_FREQUENCY) {
         c->body.forcing_changed = 1;
     }
     vi_structure_component_was_set(&c->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
@@ -276,7 +286,7 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 static void check_drive(const chain *c, char *message)
 {
     if (c->body.forcing_changed) {
-        vi_check_each(message, vi_check_finite, "forcing.amplitude", c->forcing_amplitude, (int)c->masses);
+        check_forcing(c, message);
         vi_structure_component_check_drive(&c->body, message);
     }
 }

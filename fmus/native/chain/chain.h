@@ -15,7 +15,7 @@ typedef struct {
     int64_t modes;                       /* in use; 0: all */
     vi_chain parameter; /* masses, springs, dashpots; the far spring is put in its place at initialization */
     double far_stiffness, far_damping;
-    double forcing_amplitude[VI_MODES];
+    double forcing_amplitude[VI_MODES], forcing_base_acceleration;
     double displacement_start[VI_MODES], velocity_start[VI_MODES];
     int64_t observed_mass;
     int64_t contact_mass[VI_PORTS];

@@ -136,6 +136,12 @@ static bool set_time(void *self, double time)
     return isfinite(time);
 }
 
+static bool always_finite(const void *self)
+{
+    (void)self;
+    return true;
+}
+
 static void no_values(void *self, double values[])
 {
     (void)self;
@@ -164,6 +170,7 @@ static const vi_model_exchange exchange = {
     .set_time = set_time,
     .get_states = no_values,
     .set_states = no_states,
+    .states_are_finite = always_finite,
     .get_nominals = no_values,
     .get_derivatives = no_values,
     .get_indicators = no_values,

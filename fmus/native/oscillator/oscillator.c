@@ -38,13 +38,19 @@ static void check_inputs(const oscillator *o, char *message)
     vi_check_finite(message, "force_rate", o->force_rate);
 }
 
+static void check_forcing(const oscillator *o, char *message)
+{
+    vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
+    vi_check_finite(message, "forcing.base_acceleration", o->forcing_base_acceleration);
+}
+
 static bool parameters_are_good(const oscillator *o, char *message)
 {
     vi_check_positive(message, "mass", o->mass);
     vi_check_not_negative(message, "damping", o->damping);
     vi_check_not_negative(message, "stiffness", o->stiffness);
     check_amplitude(o, message);
-    vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
+    check_forcing(o, message);
     vi_check_finite(message, "displacement_start", o->displacement_start);
     vi_check_finite(message, "velocity_start", o->velocity_start);
     vi_structure_component_check(&o->body, message);
@@ -54,11 +60,12 @@ static bool parameters_are_good(const oscillator *o, char *message)
 
 /* ---- from parameters to the mode: mass-normalised, q = sqrt(mass) x ---- */
 
-/* Modal amplitude of the harmonic force; a force of frequency 0 is constant. */
+/* Modal amplitude of the harmonic force and of the base's inertial one; a force of frequency 0 is constant. */
 static double modal_force(const oscillator *o)
 {
+    const double amplitude = o->forcing_amplitude - o->mass * o->forcing_base_acceleration;
     const double share = o->body.forcing_angular_frequency == 0.0 ? cos(o->body.forcing_phase) : 1.0;
-    return o->forcing_amplitude * share / sqrt(o->mass);
+    return amplitude * share / sqrt(o->mass);
 }
 
 /* The mode with this dashpot and spring. */
@@ -143,7 +150,8 @@ static void update_outputs(void *self)
     oscillator *o = self;
     refresh_inputs(o);
     o->time = vi_structure_component_time(&o->body);
-    vi_structure_component_outputs(&o->body, vi_structure_component_base_acceleration(&o->body));
+    vi_structure_component_outputs(
+        &o->body, vi_structure_component_base_acceleration(&o->body, o->forcing_base_acceleration));
     o->relative_acceleration = vi_structure_at(&o->body.model, o->body.model.observed, o->body.modal_acceleration);
     if (o->body.state.exchange.on) {
         const vi_exchange_body body = exchange_body(o);
@@ -170,7 +178,8 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 static void was_set(void *self, uint32_t reference)
 {
     oscillator *o = self;
-    if (reference == OSCILLATOR_FORCING_AMPLITUDE || reference == OSCILLATOR_FORCING_ANGULAR_FREQUENCY) {
+    if (reference == OSCILLATOR_FORCING_AMPLITUDE || reference == OSCILLATOR_FORCING_BASE_ACCELERATION
+        || reference == OSCILLATOR_FORCING_ANGULAR_FREQUENCY) {
         o->body.forcing_changed = 1;
     }
     vi_structure_component_was_set(&o->body, reference, OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
@@ -192,7 +201,7 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 static void check_drive(const oscillator *o, char *message)
 {
     if (o->body.forcing_changed) {
-        vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
+        check_forcing(o, message);
         vi_structure_component_check_drive(&o->body, message);
     }
 }

@@ -10,7 +10,7 @@ typedef struct {
     double time;
     /* parameters */
     double mass, damping, stiffness;
-    double forcing_amplitude;
+    double forcing_amplitude, forcing_base_acceleration;
     double displacement_start, velocity_start;
     vi_amplitude_law amplitude;
     /* inputs */

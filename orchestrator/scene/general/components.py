@@ -42,6 +42,8 @@ class DraftComponent:
         What its description says.
     parameters : mapping of str to StartValue
         The valid ones of its start values.
+    tolerance : float or None
+        Relative tolerance that its FMU is set up with; None: the FMU's own.
     """
 
     name: str
@@ -49,6 +51,7 @@ class DraftComponent:
     shipped: bool = False
     facts: ComponentFacts | None = None
     parameters: Mapping[str, StartValue] | None = None
+    tolerance: float | None = None
 
 
 def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
@@ -84,7 +87,7 @@ def _read_component(name: str, raw: object, folder: Path, problems: list[Problem
     fmu = _shipped_fmu(table, path, problems) if shipped else _fmu_file(table, path, folder, problems)
     facts = _facts(fmu, where, problems) if fmu else None
     parameters = _parameters(table.parameters, path, facts, problems) if facts else None
-    return DraftComponent(name, fmu, shipped, facts, parameters)
+    return DraftComponent(name, fmu, shipped, facts, parameters, table.tolerance)
 
 
 def _is_file_name(text: str) -> bool:
@@ -99,6 +102,12 @@ def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Pr
             Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, components()))
         )
         return None
+    if table.tolerance is not None:
+        hint = "It is exact, or has a parameter contact_tolerance: remove tolerance."
+        got = f"tolerance = {table.tolerance:g} beside {quoted(table.fmu)}"
+        problems.append(
+            Problem(key_path((*path, "tolerance")), "tolerance beside an FMU file only", got, hint)
+        )
     fmi = table.fmi or "3.0"
     try:
         return fmu_path(table.fmu, fmi)

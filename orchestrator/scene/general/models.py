@@ -56,6 +56,15 @@ class ComponentTable(SceneTable):
             default="empty",
         ),
     ] = Field(default_factory=dict)
+    tolerance: Annotated[
+        Annotated[Finite, Field(gt=0, le=1)] | None,
+        Rule(
+            "0 < tolerance <= 1",
+            hint="It is the relative tolerance of the solver inside the FMU.",
+            doc="relative tolerance that the FMU is set up with, for the solver inside it; only of a file",
+            default="the FMU's own",
+        ),
+    ] = None
 
 
 class ConnectionTable(SceneTable):

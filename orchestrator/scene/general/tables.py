@@ -108,7 +108,7 @@ def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis,
     assert component.fmu is not None
     ports = plan.parameters.get(component.name, {})
     parameters = {**_first_swept(component, axes), **(component.parameters or {}), **ports}
-    return ComponentSpec(component.name, component.fmu, parameters)
+    return ComponentSpec(component.name, component.fmu, parameters, component.tolerance)
 
 
 def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict[str, StartValue]:

@@ -6,7 +6,7 @@
 
 #include "model.h"
 
-enum { H = 1, V, G, E, LANDING, BOUNCES, LABEL, LABEL_LENGTH };
+enum { H = 1, V, G, E, LANDING, BOUNCES, LABEL, LABEL_LENGTH, TOLERANCE };
 enum { LANDING_ZERO, LANDING_KEPT, LANDING_ABOVE };
 
 const bool model_has_state = true;
@@ -27,6 +27,7 @@ bool model_begin(model *m, void *instance)
 void model_calculate(model *m)
 {
     m->value[LABEL_LENGTH] = m->value[LABEL];
+    m->value[TOLERANCE] = m->tolerance;
 }
 
 static void bounce(double *x)

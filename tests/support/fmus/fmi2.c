@@ -98,8 +98,9 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean stop_defined, fmi2Real stop)
 {
-    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
+    (void)stop_defined, (void)stop;
     of(c)->m.time = start;
+    of(c)->m.tolerance = tolerance_defined ? tolerance : 0.0;
     return fmi2OK;
 }
 

@@ -102,8 +102,9 @@ void fmi3FreeInstance(fmi3Instance c)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop)
 {
-    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
+    (void)stop_defined, (void)stop;
     of(c)->m.time = start;
+    of(c)->m.tolerance = tolerance_defined ? tolerance : 0.0;
     return at(c, AT_ENTER_INITIALIZATION);
 }
 

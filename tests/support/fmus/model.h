@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { MODEL_VALUES = 9 };
+enum { MODEL_VALUES = 10 };
 
 /* Where an adapter is, as `fault_place` in the model descriptions of Faulty. */
 typedef enum {
@@ -31,6 +31,7 @@ typedef struct {
     double reached;             /* what the last step says of its end, where its answer needs that, s */
     bool says_early;            /* STEP_SAYS: early return */
     bool early_allowed;         /* the importer handles event mode and early return */
+    double tolerance;           /* relative, that the importer has given; 0: none */
 } model;
 
 typedef enum {

@@ -214,6 +214,18 @@ def test_a_step_past_the_stop_time_is_an_error_and_one_up_to_it_is_none(
 
 @each_body
 @each_version
+@pytest.mark.parametrize("stop", [2.0, -math.inf, math.nan])
+def test_a_stop_time_before_the_start_time_is_refused(body: BodyScene, version: str, stop: float) -> None:
+    with body.fmu(version=version, initialize=False) as b:
+        setup = b.fmu.enterInitializationMode if version == "3.0" else b.fmu.setupExperiment
+        with pytest.raises(FMICallException):
+            setup(startTime=3.0, stopTime=stop)
+        assert "expected a stop time that is not before the start time 3 s, got" in b.messages[-1]
+        setup(startTime=3.0, stopTime=3.0)  # the instance is as it was, and a run may be of no length
+
+
+@each_body
+@each_version
 def test_an_input_that_is_not_a_number_is_an_error_until_it_is_one(body: BodyScene, version: str) -> None:
     with body.fmu(version=version) as b:
         b.step(1.0)

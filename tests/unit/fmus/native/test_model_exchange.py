@@ -29,6 +29,7 @@ from vibroimpact.fmus.shipped import fmu_path
 
 VERSIONS = ("2.0", "3.0")
 RESTITUTION, KELVIN_VOIGT, HERTZ, HUNT_CROSSLEY, EXTERNAL = 1, 2, 3, 4, 5
+DISCARD = 2
 OUTPUTS = ["displacement", "velocity", "energy.kinetic", "energy.potential"]
 CONTACT = ["count", "last_time", "last_velocity", "stuck", "stick_start", "stick_end", "force"]
 
@@ -342,6 +343,53 @@ def test_states_and_derivatives_are_variables_too(version: str) -> None:
     assert it.get("contact[1].event_indicator") == pytest.approx(0.9) if version == "3.0" else True
     it.set({"force": 9.0})
     assert it.derivatives(2)[1] == pytest.approx(acceleration + 1.0)
+
+
+NOT_FINITE = [(math.nan, 0.0), (0.0, math.nan), (math.inf, 0.0), (0.0, -math.inf), (1e300, 0.0)]
+
+
+@pytest.mark.parametrize("states", NOT_FINITE)
+@pytest.mark.parametrize("version", VERSIONS)
+def test_states_that_are_not_finite_are_discarded_so_that_an_integrator_halves_its_step(
+    version: str, states: tuple[float, float]
+) -> None:
+    it = Integrated("Oscillator", version)
+    it.set({"stiffness": 1e20, **stop(law=RESTITUTION, restitution=0.5, position=1.0)})
+    it.begin()
+    it.move(0.1, *states)
+    calls = {"derivatives": lambda: it.derivatives(2)}
+    if not np.isfinite(states).all():  # 1e300 has an indicator, and an acceleration beyond all numbers
+        calls["indicators"] = lambda: it.numbers("getEventIndicators", 2)
+    for call in calls.values():
+        with pytest.raises(FMICallException) as caught:
+            call()
+        assert caught.value.status == DISCARD
+        assert "Try a shorter step" in it.messages[-1]
+    # the instance is as it was: the shorter step is taken
+    it.move(0.05, 0.1, 0.2)
+    assert it.derivatives(2) == pytest.approx([0.2, -1e19])
+    assert it.numbers("getEventIndicators", 2)[0] == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("component", ["Chain", "Beam"])
+def test_one_state_of_many_that_is_not_finite_is_discarded(component: str) -> None:
+    it = Integrated(component, "3.0")
+    it.begin()
+    count = it.fmu.getNumberOfContinuousStates()
+    used = {"Chain": 2, "Beam": 1}[component]
+    it.move(0.1, *[0.0] * (count // 2 + used - 1), math.nan, *[0.0] * (count // 2 - used))
+    with pytest.raises(FMICallException) as caught:
+        it.derivatives(count)
+    assert caught.value.status == DISCARD
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_event_of_states_that_are_not_finite_is_an_error(version: str) -> None:
+    it = Integrated("Oscillator", version)
+    it.begin()
+    it.move(0.1, math.nan, 0.0)
+    it.fmu.enterEventMode()
+    assert "expected finite states" in it.message(it.update)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -37,6 +37,7 @@ BEAM = {
     "forcing.angular_frequency": 150.0,
     **stop(0.0006),
 }
+BASE = {"forcing.base_acceleration": -0.3}
 #: Component, parameters, amplitude that is tuned, time of a radian, displacements and velocities at the start and now.
 BODIES = [
     pytest.param(
@@ -47,6 +48,22 @@ BODIES = [
     ),
     pytest.param(
         "Chain", CHAIN, "forcing.amplitude[1]", 1.0, ("displacement[{}]", "velocity[{}]"), id="chain"
+    ),
+    pytest.param(
+        "Oscillator",
+        {**OSCILLATOR, **BASE},
+        "forcing.base_acceleration",
+        1.0,
+        ("displacement", "velocity"),
+        id="base",
+    ),
+    pytest.param(
+        "Chain",
+        {**CHAIN, **BASE},
+        "forcing.base_acceleration",
+        1.0,
+        ("displacement[{}]", "velocity[{}]"),
+        id="chain's base",
     ),
     pytest.param(
         "Beam", BEAM, "forcing.amplitude", 0.007, ("modal_displacement[{}]", "modal_velocity[{}]"), id="beam"
@@ -197,6 +214,34 @@ def test_a_forcing_that_no_body_can_go_on_with_is_refused(
         assert said.format(index) in body.messages[-1]
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("component", ["Oscillator", "Chain"])
+def test_a_base_that_is_no_number_is_refused_at_the_start_and_later(component: str, version: str) -> None:
+    said = "forcing.base_acceleration: expected a finite number, got inf"
+    with ComponentFmu(component, {"forcing.angular_frequency": 1.0}, version=version) as body:
+        body.set("forcing.base_acceleration", math.inf)
+        with pytest.raises(FMICallException):
+            body.step(0.1)
+        assert said in body.messages[-1]
+    base = {"forcing.base_acceleration": math.inf}
+    with ComponentFmu(component, base, version=version, initialize=False) as body:
+        with pytest.raises(FMICallException):
+            body.initialize()
+        assert said in body.messages[-1]
+
+
+def test_a_base_shaken_at_a_phase_carries_a_free_mass_along() -> None:
+    shaken = {"forcing.base_acceleration": 2.0, "forcing.angular_frequency": 3.0, "forcing.phase": 0.4}
+    with OscillatorFmu({**shaken, "stiffness": 0.0, "forcing.amplitude": 0.5}) as body:
+        for time in (0.0, 0.3, 1.7, 9.0):
+            if time:
+                body.advance(time)
+            # the force is all that the mass feels
+            assert body.get("acceleration") == pytest.approx(0.5 * math.cos(3.0 * time + 0.4), abs=1e-14)
+            relative = (0.5 - 2.0) * math.cos(3.0 * time + 0.4)
+            assert body.get("relative_acceleration") == pytest.approx(relative, abs=1e-14)
+
+
 def test_a_constant_force_may_change_its_size() -> None:
     with OscillatorFmu({"forcing.amplitude": 0.5, "forcing.phase": 1.0, "damping": 2.0}) as body:
         body.advance(50.0)
@@ -211,7 +256,6 @@ def test_the_description_says_what_is_tunable() -> None:
         for version in VERSIONS:
             with ComponentFmu(component, version=version) as body:
                 found: Any = {v.name for v in body._variables.values() if v.variability == "tunable"}
-            assert {name.partition("[")[0] for name in found} == {
-                "forcing.amplitude",
-                "forcing.angular_frequency",
-            }
+            expected = {"forcing.amplitude", "forcing.angular_frequency"}
+            expected |= {"forcing.base_acceleration"} if component != "Beam" else set()
+            assert {name.partition("[")[0] for name in found} == expected

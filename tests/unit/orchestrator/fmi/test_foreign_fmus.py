@@ -364,3 +364,46 @@ def test_a_text_ends_where_it_is_written_to_end(folder: Path) -> None:
     text = LABELLED.format(major="3", label="a\\u0000b", guard="false")
     with pytest.raises(SceneError, match=r"label: expected text without null characters, got"):
         parse_scene(text, str(folder / "scene.toml"))
+
+
+# ---- the tolerance of a solver inside an FMU ----
+
+TOLERANT = """
+[scene]
+units = "SI"
+[component.ball]
+fmu = "BouncingBall.fmi{major}.fmu"
+{tolerance}
+[record]
+recorded_time = 0.2
+variables = ["ball.tolerance"]
+rate = 10
+[execution]
+how = "coupled"
+macro_step = 0.1
+guard = {guard}
+"""
+
+
+@pytest.mark.parametrize("guard", ["true", "false"])
+@pytest.mark.parametrize(("line", "given"), [("", 0.0), ("tolerance = 1e-9", 1e-9)])
+@pytest.mark.parametrize("major", ["2", "3"])
+def test_a_component_is_set_up_with_the_tolerance_of_its_table(
+    folder: Path, major: str, line: str, given: float, guard: str
+) -> None:
+    text = TOLERANT.format(major=major, tolerance=line, guard=guard)
+    runner = make_runner(parse_scene(text, str(folder / "scene.toml")))
+    try:
+        for _ in range(2):  # the second time after a reset
+            found = runner.run({})
+            assert found.samples is not None, found.message
+            np.testing.assert_array_equal(found.samples[:, 1], given)
+    finally:
+        runner.close()
+
+
+@pytest.mark.parametrize("value", ["0.0", "-1e-6", "1.5", "nan", '"fine"'])
+def test_a_tolerance_that_is_none_is_refused(folder: Path, value: str) -> None:
+    text = TOLERANT.format(major="3", tolerance=f"tolerance = {value}", guard="false")
+    with pytest.raises(SceneError, match=r"component\.ball\.tolerance: expected .*got"):
+        parse_scene(text, str(folder / "scene.toml"))

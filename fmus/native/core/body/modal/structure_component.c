@@ -308,16 +308,18 @@ double vi_structure_component_time(const vi_structure_component *c)
     return vi_clock_time(&c->model.clock, c->state.now);
 }
 
-double vi_structure_component_base_acceleration(const vi_structure_component *c)
-{
-    const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
-    return c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
-}
-
-double vi_structure_component_forcing(const vi_structure_component *c)
+/* cos of the force's phase at the present instant; of forcing_phase when it is constant. */
+static double cosine_of_forcing(const vi_structure_component *c)
 {
     const double w = c->model.clock.angular_frequency;
     return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
+}
+
+double vi_structure_component_base_acceleration(const vi_structure_component *c, double amplitude)
+{
+    const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
+    const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
+    return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
 }
 
 static void update_energies(vi_structure_component *c)

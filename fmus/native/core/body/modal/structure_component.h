@@ -69,11 +69,8 @@ void vi_structure_component_check_drive(const vi_structure_component *c, char me
 void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],
                                  const double held_rate[VI_MODES]);
 
-/* Input base acceleration at the present instant, m/s^2. */
-double vi_structure_component_base_acceleration(const vi_structure_component *c);
-
-/* cos of the force's phase at the present instant; of forcing_phase when it is constant. */
-double vi_structure_component_forcing(const vi_structure_component *c);
+/* Acceleration of the base at the present instant, m/s^2: the input, and the forcing of this amplitude (m/s^2). */
+double vi_structure_component_base_acceleration(const vi_structure_component *c, double amplitude);
 
 /* Recompute what is shared of the outputs. `base_acceleration`: absolute acceleration of the base, m/s^2. */
 void vi_structure_component_outputs(vi_structure_component *c, double base_acceleration);

@@ -141,6 +141,15 @@ void vi_exchange_set_states(const vi_exchange_body *body, const double states[])
     take(body, states + body->modes, body->parts.state->p);
 }
 
+bool vi_exchange_states_are_finite(const vi_exchange_body *body)
+{
+    bool finite = true;
+    for (int j = 0; j < vi_structure_modes(body->parts.model); ++j) {
+        finite = finite && isfinite(body->parts.state->q[j]) && isfinite(body->parts.state->p[j]);
+    }
+    return finite;
+}
+
 void vi_exchange_get_nominals(const vi_exchange_body *body, double nominals[])
 {
     for (int j = 0; j < body->modes; ++j) {

@@ -33,6 +33,7 @@ bool vi_exchange_begin(const vi_exchange_body *body, char message[VI_MESSAGE_LEN
 bool vi_exchange_set_time(const vi_exchange_body *body, double time);
 void vi_exchange_get_states(const vi_exchange_body *body, double states[]);
 void vi_exchange_set_states(const vi_exchange_body *body, const double states[]);
+bool vi_exchange_states_are_finite(const vi_exchange_body *body);
 void vi_exchange_get_nominals(const vi_exchange_body *body, double nominals[]);
 void vi_exchange_get_derivatives(const vi_exchange_body *body, double derivatives[]);
 void vi_exchange_get_indicators(const vi_exchange_body *body, double indicators[]);
@@ -83,6 +84,11 @@ void vi_exchange_go_on(const vi_exchange_body *body);
         const vi_exchange_body body = BIND(self);                                                                    \
         vi_exchange_set_states(&body, states);                                                                       \
     }                                                                                                                \
+    static bool NAME##_states_are_finite(const void *self)                                                           \
+    {                                                                                                                \
+        const vi_exchange_body body = BIND((void *)(uintptr_t)self);                                                 \
+        return vi_exchange_states_are_finite(&body);                                                                 \
+    }                                                                                                                \
     static void NAME##_get_nominals(void *self, double nominals[])                                                   \
     {                                                                                                                \
         const vi_exchange_body body = BIND(self);                                                                    \
@@ -119,6 +125,7 @@ void vi_exchange_go_on(const vi_exchange_body *body);
         .set_time = NAME##_set_time,                                                                                 \
         .get_states = NAME##_get_states,                                                                             \
         .set_states = NAME##_set_states,                                                                             \
+        .states_are_finite = NAME##_states_are_finite,                                                               \
         .get_nominals = NAME##_get_nominals,                                                                         \
         .get_derivatives = NAME##_get_derivatives,                                                                   \
         .get_indicators = NAME##_get_indicators,                                                                     \
