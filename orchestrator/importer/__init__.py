@@ -14,6 +14,7 @@ Any set of co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step of 
 
 `specification` says what an importer is made of, `component` is one FMU in it, `wiring` moves values between them and
 solves algebraic loops, `order` says who is stepped first, `step_plan` what a step must do, `master` steps them,
-`plain_loop` makes plain steps in C, `events` resolves events, `ticks` has the clocks, `contacts` are all places where bodies touch something,
+`plain_loop` makes plain steps in C, `events` resolves events, `ticks` has the clocks,
+`contacts` are all places where bodies touch something,
 `sampling` and `energy` watch without disturbing.
 """
