@@ -8,7 +8,7 @@ from pathlib import Path
 from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene, scene_with_modes
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.ssp import export_system, import_system, load_system
+from vibroimpact.orchestrator.ssp import export_system, import_system, load_system, say_notes
 
 
 def export_fmu(
@@ -115,6 +115,8 @@ def import_ssp(
 ) -> Scene:
     """Read a system (SSP 1.0 or 2.0) as a scene; `run`, `campaign` and `cost_of` take its path as it is.
 
+    What the system leaves open, and parameters that nothing has, are said on standard error.
+
     Parameters
     ----------
     path : path
@@ -144,6 +146,8 @@ def import_ssp(
     """
     sets = given_paths(parameters)
     if output is None:
-        return load_system(given_path(path), (), sets).scene
-    import_system(given_path(path), given_path(output), (), sets)
+        imported = load_system(given_path(path), (), sets)
+        say_notes(imported.notes)
+        return imported.scene
+    say_notes(import_system(given_path(path), given_path(output), (), sets).notes)
     return Scene.from_file(output)

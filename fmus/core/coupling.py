@@ -19,6 +19,7 @@ class CouplingEnd(IntEnum):
     reached = 3
     failed = 4
     endless = 5
+    cut = 6
 
 
 class CallKind(IntEnum):
@@ -64,7 +65,7 @@ class CouplingComponent(Structure):
         ("step", CouplingCall),
         *((name, CouplingCalls) for name in ("inputs", "save", "restore", "event_times")),
         *((name, c_int32) for name in ("event_mode", "may_return_early", "number")),
-        ("internal_step", c_double),
+        *((name, c_double) for name in ("internal_step", "only_step")),
         *((name, c_void_p) for name in ("step_time", "step_size", "last_time", "flags")),
         ("time", c_double),
     ]
@@ -79,7 +80,7 @@ class CouplingPlan(Structure):
         ("saves", c_int32),
         *((name, CouplingCalls) for name in ("start", "begin", "again", "leave")),
         ("decisions", POINTER(c_void_p)),
-        *((name, c_int32) for name in ("deciding", "most_iterations")),
+        *((name, c_int32) for name in ("deciding", "most_iterations", "no_state_prior")),
         *((name, c_double) for name in ("same_instant", "time_rounding", "step_rounding")),
         *((name, c_void_p) for name in ("noted_call", "noted_time")),
     ]
@@ -142,6 +143,6 @@ def advance_coupled(plan: CouplingPlan, progress: CouplingProgress, run: Couplin
     -------
     CouplingEnd
         `listen`: it has taken `most_seconds`; after `stepped` and `reached` the caller finishes the step; `failed`: a
-        call has; `endless`: the events do not settle.
+        call has; `endless`: the events do not settle; `cut`: a component takes steps of another size.
     """
     return CouplingEnd(_function()(plan, progress, run))

@@ -8,7 +8,7 @@ from pathlib import Path
 from vibroimpact.analysis.dataset.outputs import refuse_outputs
 from vibroimpact.fmus.terminal import note, say
 from vibroimpact.orchestrator.scene import load_scene
-from vibroimpact.orchestrator.ssp import export_system, import_system
+from vibroimpact.orchestrator.ssp import export_system, import_system, say_notes
 
 
 def export_to_archive(
@@ -33,6 +33,5 @@ def import_to_scene(
     """Write a scene with its FMUs, and say where it is and what the archive left open."""
     target = output or Path(f"{archive.stem}.toml")
     refuse_outputs([archive, *parameters], target, ending=".toml")
-    for line in import_system(archive, target, changes, parameters, force=force).notes:
-        say(f"note: {line}", err=True)
+    say_notes(import_system(archive, target, changes, parameters, force=force).notes)
     say(str(target))

@@ -19,12 +19,18 @@ from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.fmi.rounding import is_usual, set_usual
 from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
 
-OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+#: noSetFMUStatePriorToCurrentPoint of every step. States are set that were saved where the step begins, or later: no
+#: importer here goes back before that. Some FMUs take false for a last step that is not accepted, and begin it again.
+NO_STATE_PRIOR_TO_POINT = True
 STATUS_WORDS = ("ok", "warning", "discard", "error", "fatal", "pending")
 
 #: Largest error of the time at which an FMU says that a step has ended: relative to 1 + |time|, and to the step.
 TIME_ROUNDING = 1e-9
 STEP_ROUNDING = 1e-6
+
+#: Largest difference of a step from the one size that an FMU takes, relative: the rounding of long times.
+SAME_SIZE = STEP_ROUNDING
 
 #: Wraps a function of an FMU, given its name: for a guard that notes which call is under way.
 Wrapper = Callable[[str, Function], Function]
@@ -75,6 +81,8 @@ class Instance(ABC):
         The time reached by the last `step`, s.
     internal_step : float
         Step of the FMU's own solver that its description declares, s; 0: none. Its steps end at multiples of that.
+    only_step : float
+        The one size that its steps have, s; 0: any.
     changed_rounding : bool
         It has changed the rounding mode of the process, or the treatment of subnormal numbers; it was set back.
     is_fatal : bool
@@ -100,7 +108,7 @@ class Instance(ABC):
         self.time = 0.0
         self.needs_event_mode = self.returned_early = self.wants_to_end = self.is_flagged = False
         self.is_fatal = False
-        self.internal_step = 0.0
+        self.internal_step = self.only_step = 0.0
         self.changed_rounding = False
         self._library = Library(fmu)
         self.wrap = wrap
@@ -132,6 +140,8 @@ class Instance(ABC):
         if status > WARNING or status < OK:
             self.is_fatal = self.is_fatal or status == FATAL
             word = STATUS_WORDS[status] if 0 <= status < len(STATUS_WORDS) else f"status {status}"
+            if status == PENDING:
+                word += ", a step that goes on by itself (canRunAsynchronuously), which no importer here waits for,"
             self.fail(function, f"returned {word} at time {self.time:.17g}")
 
     def fail(self, function: str, what: str) -> NoReturn:
@@ -247,8 +257,27 @@ class Instance(ABC):
     def step(self, time: float, size: float) -> int:
         """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
         self._step_time.value = time
-        self._step_size.value = size
+        self._step_size.value = size if self.only_step == 0.0 else self._one_size(time, size)
         return self.take_step(self._do_step())
+
+    def _one_size(self, time: float, size: float) -> float:
+        """Return the one size of its steps for a step that has it but for rounding; refuse any other."""
+        if abs(size - self.only_step) > SAME_SIZE * self.only_step:
+            self.refuse_cut(time, size)
+        return self.only_step
+
+    def refuse_cut(self, time: float, size: float) -> NoReturn:
+        """Raise the error of a step at `time` that is cut to `size`, s, of an FMU that takes steps of one size."""
+        self.time = time
+        raise ComponentError(
+            f"{self.name}: {self.prefix}DoStep: expected steps of {self.only_step:.12g} s, since "
+            f"canHandleVariableCommunicationStepSize = false, got one of {size:.12g} s at time {time:.12g}. "
+            "Events of other components, samples between steps and an end between them cut steps: choose a macro_step "
+            "of which they are multiples.",
+            instance=self.name,
+            function=f"{self.prefix}DoStep",
+            time=time,
+        )
 
     @abstractmethod
     def take_step(self, status: int) -> int:

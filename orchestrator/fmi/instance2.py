@@ -8,7 +8,14 @@ from ctypes import c_char_p, c_double, c_int, c_void_p
 from pathlib import Path
 
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
-from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, WARNING, Instance, Wrapper
+from vibroimpact.orchestrator.fmi.instance import (
+    DISCARD,
+    NO_STATE_PRIOR_TO_POINT,
+    OK,
+    WARNING,
+    Instance,
+    Wrapper,
+)
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY
 from vibroimpact.orchestrator.fmi.variables import FMI2_NAMES
@@ -66,7 +73,9 @@ class Instance2(Instance):
             self._instantiate()
         self._keep_rounding()
         self._bind_life()
-        self._do_step = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
+        self._do_step = self._bound(
+            "DoStep", self._step_time, self._step_size, c_int(NO_STATE_PRIOR_TO_POINT)
+        )
         self._bind_states()
 
     def _instantiate(self) -> None:

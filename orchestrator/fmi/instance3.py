@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import c_bool, c_char_p, c_double, c_size_t, c_uint16, c_uint32, c_void_p
+import math
+from collections.abc import Sequence
+from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint16, c_uint32, c_void_p
 
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
-from vibroimpact.orchestrator.fmi.instance import DISCARD, Instance, Wrapper
+from vibroimpact.orchestrator.fmi.instance import DISCARD, NO_STATE_PRIOR_TO_POINT, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY
+
+#: What fmi3GetIntervalDecimal says of an interval that the FMU does not know yet.
+INTERVAL_NOT_YET_KNOWN = 0
 
 
 class Instance3(Instance):
@@ -83,7 +88,24 @@ class Instance3(Instance):
         self._last_time = c_double()
         outputs = [ctypes.byref(flag) for flag in (self._needs_event, self._ends, self._early)]
         outputs.append(ctypes.byref(self._last_time))
-        self._do_step = self._bound("DoStep", self._step_time, self._step_size, c_bool(False), *outputs)
+        prior = c_bool(NO_STATE_PRIOR_TO_POINT)
+        self._do_step = self._bound("DoStep", self._step_time, self._step_size, prior, *outputs)
+
+    def set_clocks(self, references: Sequence[int]) -> None:
+        """Let input clocks tick, in event mode."""
+        count = len(references)
+        places, ticks = (c_uint32 * count)(*references), (c_bool * count)(*[True] * count)
+        self.check(self._function("SetClock")(self._pointer, places, c_size_t(count), ticks), "SetClock")
+
+    def clock_times(self, reference: int) -> tuple[float, float]:
+        """Return interval and shift of a fixed input clock, s, in initialization mode; NaN for one not known yet."""
+        place, one = ctypes.byref(c_uint32(reference)), c_size_t(1)
+        interval, shift, qualifier = c_double(math.nan), c_double(math.nan), c_int()
+        get_interval, get_shift = self._function("GetIntervalDecimal"), self._function("GetShiftDecimal")
+        status = get_interval(self._pointer, place, one, ctypes.byref(interval), ctypes.byref(qualifier))
+        self.check(status, "GetIntervalDecimal")
+        self.check(get_shift(self._pointer, place, one, ctypes.byref(shift)), "GetShiftDecimal")
+        return (math.nan if qualifier.value == INTERVAL_NOT_YET_KNOWN else interval.value), shift.value
 
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
         """Enter initialization mode at `start_time`, s, with a relative tolerance; None: the FMU's own."""

@@ -39,6 +39,8 @@ METHODS = {
     "free": "FreeInstance",
     "save": "GetFMUState",
     "restore": "SetFMUState",
+    "set_clocks": "SetClock",
+    "clock_times": "GetIntervalDecimal",
 }
 
 

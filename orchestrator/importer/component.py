@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_void_p
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+from weakref import WeakValueDictionary
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
-from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.fmi.capabilities import NEEDS_TOOL, ONLY_ONCE, capabilities_of
+from vibroimpact.orchestrator.fmi.instance import OK, Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.log import LogTail
@@ -43,6 +45,8 @@ def kind_of(variable: ModelVariable) -> str:
     return KINDS.get(name, name)
 
 
+#: By the hash of its file, the instance of an FMU of which a process may have one.
+_only_instances: WeakValueDictionary[str, Component] = WeakValueDictionary()
 #: Instants closer than this times (1 + |time|), s, are one.
 SAME_INSTANT = 1e-13
 
@@ -63,8 +67,13 @@ class Component:
 
     Attributes
     ----------
+    capabilities : Capabilities
+        What its description declares.
     has_states : bool
         It can go back to a saved state.
+    ticking : frozenset of int or None
+        Value references of its input clocks that tick now, of all of which variables may be read and written; None
+        until its run begins, when all may be.
     event_mode : bool
         It handles events in event mode and may return early.
     refuses_events : bool
@@ -90,22 +99,80 @@ class Component:
             raise ComponentFileError(f"{spec.fmu}: expected an FMU with co-simulation, got {other} only.")
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
         self.depends = _dependencies(description)
-        self.has_states = bool(interface.canGetAndSetFMUstate)
-        version = 3 if description.fmiVersion.startswith("3") else 2
-        self.event_mode = events and version == 3 and bool(interface.hasEventMode)
         fmu = unpack(spec.fmu)
+        self.capabilities = capabilities_of(description, fmu.folder)
+        self._refuse_what_it_needs()
+        self.has_states = self.capabilities.restorable
+        version = 3 if description.fmiVersion.startswith("3") else 2
+        self.event_mode = events and version == 3 and self.capabilities.event_mode
         self.refuses_events = False
+        self.ticking: frozenset[int] | None = None
+        self._clocked: list[tuple[VariableGroup, Callable[[], int], frozenset[int]]] = []
+        self.sha256 = fmu.sha256
+        self._take_only_instance()
         self.instance: Instance2 | Instance3 = (
             self._instance3(fmu, log, wrap)
             if version == 3
-            else Instance2(fmu, spec.name, log=log, wrap=wrap, reuse=_loses_memory(description))
+            else self._instance2(fmu, log, wrap, _loses_memory(description))
         )
-        self.instance.internal_step = float(getattr(interface, "fixedInternalStepSize", None) or 0.0)
-        self.sha256 = fmu.sha256
+        self.instance.internal_step = self.capabilities.internal_step
+        if self.capabilities.clocks and not self.event_mode:
+            raise self._clocks_error()
         self.at_start, self.at_end = c_void_p(), c_void_p()
         self._start_groups: dict[str, VariableGroup] = {}
         self._inputs: list[VariableGroup] = []
         self.event_times = self._event_time_group() if version == 2 and self.has_states else None
+
+    def _refuse_what_it_needs(self) -> None:
+        """Refuse an FMU that needs what no importer here has."""
+        if self.capabilities.refusals:
+            got = " and ".join(self.capabilities.refusals)
+            raise ComponentFileError(
+                f"{self.spec.fmu}: expected input clocks of a constant or fixed interval alone, got {got}."
+            )
+
+    def _take_only_instance(self) -> None:
+        """Take the place of the one instance that this process may have of some FMUs."""
+        if not self.capabilities.only_once:
+            return
+        other = _only_instances.get(self.sha256)
+        if other is not None:
+            raise ComponentError(
+                f"{self.name}: expected the only instance of {self.spec.fmu.name} in a process "
+                f"({ONLY_ONCE}), got one beside {other.name}.",
+                instance=self.name,
+            )
+        _only_instances[self.sha256] = self
+
+    def _instance2(
+        self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None, reuse: bool
+    ) -> Instance2:
+        # an instance that is kept for another one of its name would be a second one beside one of another name
+        reuse = reuse and not self.capabilities.only_once
+        try:
+            return Instance2(fmu, self.name, log=log, wrap=wrap, reuse=reuse)
+        except ComponentError as refusal:
+            raise self._named_tool(refusal) from None
+
+    def _named_tool(self, refusal: ComponentError) -> ComponentError:
+        """Return why there is no instance, with the tool that must be there."""
+        if not self.capabilities.tool or isinstance(refusal, ComponentFileError):
+            return refusal
+        return ComponentError(
+            f"{refusal} It needs {self.capabilities.tool} on this machine ({NEEDS_TOOL}).",
+            instance=refusal.instance,
+            function=refusal.function,
+            time=refusal.time,
+            log=refusal.log,
+        )
+
+    def _clocks_error(self) -> ComponentError:
+        names = ", ".join(clock.name for clock in self.capabilities.clocks)
+        why = "made no instance with it" if self.refuses_events else "is watched, and so runs without it"
+        return ComponentError(
+            f"{self.name}: expected event mode, in which its input clock {names} ticks, got a component that {why}.",
+            instance=self.name,
+        )
 
     def _instance3(self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None) -> Instance3:
         """Make an instance with event mode where that is declared; some FMUs refuse what they declare."""
@@ -114,11 +181,11 @@ class Component:
             return make(event_mode=self.event_mode)
         except ComponentError as refusal:
             if not self.event_mode:
-                raise
+                raise self._named_tool(refusal) from None
             try:
                 instance = make()
             except ComponentError:
-                raise refusal from None
+                raise self._named_tool(refusal) from None
         self.event_mode, self.refuses_events = False, True
         return instance
 
@@ -132,10 +199,51 @@ class Component:
 
     def group(self, kind: str, names: Sequence[str]) -> VariableGroup:
         """Return a group of this component's variables, by name."""
-        return self.instance.group(kind, [self.variables[name].valueReference for name in names])
+        found = self.instance.group(kind, [self.variables[name].valueReference for name in names])
+        return self.clocked(found, names)
+
+    def clocks_of(self, name: str) -> frozenset[int]:
+        """Return the value references of the clocks of a variable."""
+        return frozenset(clock.valueReference for clock in self.variables[name].clocks or ())
+
+    def clocked(self, group: VariableGroup, names: Sequence[str]) -> VariableGroup:
+        """Let a group of variables of clocks be moved only while one of these ticks; between, it keeps its values.
+
+        Raises
+        ------
+        ComponentError
+            The variables have different clocks.
+        """
+        clocks = {self.clocks_of(name) for name in names}
+        if not self.capabilities.clocks or clocks <= {frozenset()}:
+            return group
+        if len(clocks) > 1:
+            raise ComponentError(
+                f"{self.name}: expected variables of one clock, got {', '.join(names)} of several.",
+                instance=self.name,
+            )
+        (own,) = clocks
+        get, put = group.get_call, group.set_call
+
+        def is_open() -> bool:
+            return self.ticking is None or not own.isdisjoint(self.ticking)
+
+        group.get_call = lambda: get() if is_open() else OK
+        group.set_call = lambda: put() if is_open() else OK
+        self._clocked.append((group, get, own))
+        if not is_open():  # made within a run: nothing is kept yet
+            self.instance.check(get(), f"Get{group.name}")
+        return group
+
+    def read_clocked(self) -> None:
+        """Read all groups of variables whose clocks tick."""
+        for group, get, own in self._clocked:
+            if self.ticking is not None and not own.isdisjoint(self.ticking):
+                self.instance.check(get(), f"Get{group.name}")
 
     def begin(self, values: Mapping[str, Value], start_time: float, *, first: bool) -> None:
         """Set parameters and start values and enter initialization mode."""
+        self.ticking = None
         if not first:
             self.instance.reset()
         for name, value in {**self.spec.parameters, **values}.items():
@@ -235,6 +343,8 @@ class Component:
             if slot and not self.instance.is_fatal:
                 self.instance.free_state(slot)
         self.instance.free()
+        if _only_instances.get(self.sha256) is self:
+            del _only_instances[self.sha256]
 
 
 def _loses_memory(description: ModelDescription) -> bool:

@@ -12,6 +12,7 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Instance
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.wiring import CallList, StatusCall, Transfer
 
 #: Event iterations at one instant before a component is taken to change its outputs for ever.
@@ -92,21 +93,27 @@ class EventMode:
         leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in self.instances]
         # at its event a component's inputs from those stepped before it are those of that instant already
         first = [call for t in behind if _takes_events(t.target) for call in t.calls()]
-        again = [call for t in transfers if _takes_events(t.target) for call in t.calls()]
+        moves = [call for t in transfers if _takes_events(t.target) for call in t.calls()]
         self.begin = CallList([*enter, *first, *update])
+        self._enter, self._update = CallList(enter), CallList(update)
+        self._moves = CallList(moves)
         self._begin_run = CallList([*first, *update])  # initialization ends in event mode
-        self.again = CallList([*again, *update])
+        self.again = CallList([*moves, *update])
         self.leave = CallList(leave)
 
-    def resolve(self, time: float) -> bool:
-        """Resolve the events at `time`, s; returns whether a component asks for the end.
+    def resolve(self, time: float, ticks: Ticks) -> bool:
+        """Resolve the events at `time`, s, and let clocks tick; returns whether a component asks for the end.
 
         Raises
         ------
         ComponentError
             A component fails, or never settles.
         """
-        self.begin()
+        if ticks.are_due(time):
+            self._enter()
+            self._tick(time, ticks)
+        else:
+            self.begin()
         ends = False
         for instance in self.instances:
             if instance.decisions.value:
@@ -115,11 +122,21 @@ class EventMode:
         self.leave()
         return ends
 
-    def begin_run(self, time: float) -> bool:
+    def _tick(self, time: float, ticks: Ticks) -> None:
+        """Let clocks tick: their variables are given and read while they do, before the event iteration ends it."""
+        ticks.set(time)
+        self._moves()
+        ticks.keep_values()
+        self._update()
+
+    def begin_run(self, time: float, ticks: Ticks) -> bool:
         """Leave the event mode that initialization ends in, as `resolve` does."""
         if not self.instances:
             return False
-        self._begin_run()
+        if ticks.are_due(time):
+            self._tick(time, ticks)
+        else:
+            self._begin_run()
         ends = self._iterate(time)
         self.leave()
         return ends

@@ -32,6 +32,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.importer.step_plan import Parts, StepPlan
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import MOST_REPETITIONS
+from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
 from vibroimpact.orchestrator.importer.wiring import LoopSolver, SettlingInputs, order_of, transfers_of
 
@@ -122,6 +123,7 @@ class Importer:
         self.transfers = transfers_of(order, self.components)
         self.tuning = Tuning(self.components, tuning, self.transfers)
         self.loops = LoopSolver(order.loops, self.components)
+        self.ticks = Ticks(self.components.values())
         self.contacts = ContactBonds(
             self.components, self.transfers, connections, contacts, pairs, contact_steps
         )
@@ -139,6 +141,7 @@ class Importer:
             self.watches,
             self.contacts,
             self.tuning,
+            self.ticks,
         )
         self._progress = Progress()
         self._plan = StepPlan(parts, exchange, self._progress)
@@ -188,14 +191,18 @@ class Importer:
         for component in self._order:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
             component.begin(own, start_time, first=not self._begun)
+            if not component.capabilities.variable_steps and math.isfinite(self.macro_step):
+                component.instance.only_step = self.macro_step
         self._begun = True
         settle_connections([*self.transfers, *self.tuning.transfers], self.loops, start_time)
         self.tuning.begin()
+        self.ticks.begin(start_time)
         for component in self._order:
             component.instance.exit_initialization()
+            component.ticking = frozenset()
         for watch in self.watches:
             watch.begin()
-        self.wants_to_end = self._plan.event_mode.begin_run(start_time)
+        self.wants_to_end = self._plan.event_mode.begin_run(start_time, self.ticks)
         self.contacts.begin(start_time)
         self._note(self.contacts.pairs.resolve(start_time))
         self._tune(start_time)
@@ -223,7 +230,7 @@ class Importer:
             if seconds > 0.0 and (loop := self._plan.plain_loop) is not None:
                 self._make_plain_steps(loop, end, seconds)
             else:
-                self._step(time, min(now.next_point, end))
+                self._step(time, min(now.next_point, end, self.ticks.next))
 
     # ---- plain steps ----
 
@@ -251,6 +258,8 @@ class Importer:
             self._at_event, self._reached = loop.at_event(), run.reached
             self._stopper = (self._at_event or self._order)[0]
             self._conclude(run.start, run.target)
+        elif came_to is CouplingEnd.cut:
+            loop.explain_cut()
         elif came_to is CouplingEnd.failed:
             loop.explain()
         elif came_to is CouplingEnd.endless:
@@ -300,7 +309,8 @@ class Importer:
             for watch in self.watches:
                 watch.confirm()
             self._note(component.name for component in self._at_event)
-            if self._plan.event_mode.resolve(end):
+        if self._at_event or self.ticks.are_due(end):
+            if self._plan.event_mode.resolve(end, self.ticks):
                 self.wants_to_end = True
         elif end < target and self.on_pause is not None:
             self.on_pause()

@@ -24,7 +24,13 @@ from vibroimpact.fmus.core.coupling import (
     CouplingRun,
     advance_coupled,
 )
-from vibroimpact.orchestrator.fmi.instance import STEP_ROUNDING, TIME_ROUNDING, CallNotes, Instance
+from vibroimpact.orchestrator.fmi.instance import (
+    NO_STATE_PRIOR_TO_POINT,
+    STEP_ROUNDING,
+    TIME_ROUNDING,
+    CallNotes,
+    Instance,
+)
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
@@ -107,6 +113,7 @@ class PlainLoop:
             decisions=self._decisions,
             deciding=len(decisions),
             most_iterations=EVENT_ITERATIONS,
+            no_state_prior=NO_STATE_PRIOR_TO_POINT,
             same_instant=SAME_INSTANT,
             time_rounding=TIME_ROUNDING,
             step_rounding=STEP_ROUNDING,
@@ -223,7 +230,7 @@ class PlainLoop:
         run.events = None if late is None else self._events_address
         run.events_room = 0 if late is None else min(MOST_EVENTS, late.room())
         for instance, step in self._stepped:
-            step.time = instance.time
+            step.time, step.only_step = instance.time, instance.only_step
         came_to = advance_coupled(self._plan, self._progress, run)
         for instance, step in self._stepped:
             instance.take_time(step.time)
@@ -234,6 +241,11 @@ class PlainLoop:
     def at_event(self) -> list[Component]:
         """Return the components at an event at the end of the step that was left."""
         return [self._components[i] for i in self._at_event[: self.run.arrived]]
+
+    def explain_cut(self) -> None:
+        """Raise the error of a component whose step is cut to a size that it does not take."""
+        run = self.run
+        self._components[run.at].instance.refuse_cut(run.start, run.goal - run.start)
 
     def explain(self) -> None:
         """Raise the error of the call that failed."""

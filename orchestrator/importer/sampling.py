@@ -25,8 +25,11 @@ class _Probe:
     def __init__(self, component: Component, columns: Sequence[tuple[int, str]]) -> None:
         self.component = component
         self.groups: list[tuple[list[int], VariableGroup]] = []
-        for kind in sorted({kind_of(component.variables[name]) for _, name in columns}):
-            chosen = [(i, name) for i, name in columns if kind_of(component.variables[name]) == kind]
+        alike: dict[tuple[str, frozenset[int]], list[tuple[int, str]]] = {}
+        for place, name in columns:
+            key = kind_of(component.variables[name]), component.clocks_of(name)
+            alike.setdefault(key, []).append((place, name))
+        for (kind, _), chosen in alike.items():
             self.groups.append(([i for i, _ in chosen], component.group(kind, [name for _, name in chosen])))
         self.before = np.zeros(0)
 

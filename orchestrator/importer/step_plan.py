@@ -13,6 +13,7 @@ from vibroimpact.orchestrator.importer.plain_loop import PlainLoop, can_loop
 from vibroimpact.orchestrator.importer.progress import Progress
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import Exchange
+from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.tuning import Tuning
 from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, moves_of
 
@@ -39,6 +40,7 @@ class Parts:
     watches: Sequence[Watch]
     contacts: ContactBonds
     tuning: Tuning
+    ticks: Ticks
 
 
 class StepPlan:
@@ -117,7 +119,14 @@ class StepPlan:
 
     def _made_loop(self) -> PlainLoop | None:
         parts = self._parts
-        if self.iterates or self.stateless_paths or parts.loops.names or parts.watches or parts.tuning:
+        if (
+            self.iterates
+            or self.stateless_paths
+            or parts.loops.names
+            or parts.watches
+            or parts.tuning
+            or parts.ticks
+        ):
             return None
         components, inputs = zip(*self.paths, strict=True)
         events = self.event_mode

@@ -132,7 +132,8 @@ class Transfer:
         self._gains = np.array([c.gain for c in connections])
         same_type = DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
         shared = same_type and bool(np.all(self._gains == 1.0))
-        self.write = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
+        written = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
+        self.write = target.clocked(written, [c.target[1] for c in connections])
         self.convert: Callable[[], int] | None = None if shared else self._converter()
         self._bind_rates()
 
@@ -213,10 +214,8 @@ class Transfer:
     def set_gain(self, connection: ConnectionSpec, gain: float) -> None:
         """Change the gain of one connection; the calls of `calls` must be bound again."""
         if self.convert is None:
-            self.write = self.target.instance.group(
-                kind_of(self.target.variables[connection.target[1]]),
-                [self.target.variables[c.target[1]].valueReference for c in self.connections],
-            )
+            kind = kind_of(self.target.variables[connection.target[1]])
+            self.write = self.target.group(kind, [c.target[1] for c in self.connections])
         self._gains[[c.target for c in self.connections].index(connection.target)] = gain
         self.convert = self._converter()
 
@@ -331,13 +330,15 @@ def transfers_of(order: TransferOrder, components: dict[str, Component]) -> tupl
     )
 
 
-def _key(connection: ConnectionSpec, components: dict[str, Component]) -> tuple[str, str, str, str]:
+def _key(connection: ConnectionSpec, components: dict[str, Component]) -> tuple[object, ...]:
     source, target = components[connection.source[0]], components[connection.target[0]]
     return (
         source.name,
         target.name,
         kind_of(source.variables[connection.source[1]]),
         kind_of(target.variables[connection.target[1]]),
+        source.clocks_of(connection.source[1]),
+        target.clocks_of(connection.target[1]),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.ssp.opening import is_system, opened_scene, refuse_system_elsewhere
+from vibroimpact.orchestrator.ssp.opening import is_system, opened_scene, refuse_system_elsewhere, say_notes
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ __all__ = [
     "load_system",
     "opened_scene",
     "refuse_system_elsewhere",
+    "say_notes",
 ]
 
 

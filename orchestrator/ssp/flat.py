@@ -61,7 +61,7 @@ class FlatSystem:
     components : dict of Path to Component
         In the order of the file; without the gains.
     ignored : list of str
-        Parameters that no variable takes, as SSP wants it.
+        Parameters that no variable takes, and names of mappings that no parameter has: SSP wants them left out.
 
     Raises
     ------
@@ -98,6 +98,7 @@ class FlatSystem:
         elements: list[tuple[Path, Component | System]] = [*self._all.items(), *self._inner_first()]
         for path, element in elements:
             for binding in element.bindings:
+                self.ignored += [".".join((*path, name)) for name in binding.unmatched]
                 for parameter in binding.parameters:
                     self.apply(parameter, path, values)
         return values

@@ -37,6 +37,8 @@ from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
 
 MOST_COMPONENTS = 1000
+#: Parameters of no variable that one note names.
+MOST_NAMED = 5
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
 _scratch: list[ScratchFolder] = []
 """Folders of systems that run from their archives; they go at the end of the process."""
@@ -214,7 +216,16 @@ def _read(
     tables, more = scene_tables(structure, flat, fmus, facts)
     if parameters:
         with_sets(tables, flat, facts, read_sets(archive, parameters))
-    return tables, [*notes, *more]
+    return tables, [*notes, *_left_out(flat.ignored), *more]
+
+
+def _left_out(ignored: Sequence[str]) -> Iterator[str]:
+    """Yield what is said of parameters that nothing has: of the system, and of sets from outside."""
+    names = list(dict.fromkeys(ignored))
+    if names:
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        named = ", ".join(name[:100] for name in names[:MOST_NAMED])
+        yield f"parameters of no variable, which were left out: {named}{more}"
 
 
 def _fmus(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -14,7 +14,9 @@ ENDING = ".ssp"
 
 
 def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
-    """Return the scene of a file; the FMUs of a system lie unpacked until this process ends.
+    """Return the scene of a file; what a system leaves open is said on standard error.
+
+    The FMUs of a system lie unpacked until this process ends.
 
     Parameters
     ----------
@@ -34,7 +36,17 @@ def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scen
         return load_scene(path, changes)
     from vibroimpact.orchestrator.ssp.importing import load_system
 
-    return load_system(path, changes).scene
+    imported = load_system(path, changes)
+    say_notes(imported.notes)
+    return imported.scene
+
+
+def say_notes(notes: Iterable[str]) -> None:
+    """Say on standard error what a system leaves open, and what was chosen."""
+    from vibroimpact.fmus.terminal import say
+
+    for line in notes:
+        say(f"note: {line}", err=True)
 
 
 def is_system(path: str | PathLike[str]) -> bool:

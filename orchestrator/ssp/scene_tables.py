@@ -72,11 +72,8 @@ def scene_tables(
     facts : mapping of Path to ComponentFacts
     """
     names, values = names_of(list(flat.components)), flat.start_values()
-    noted, notes = noted_tables(structure), []
-    if flat.ignored:
-        more = f" and {len(flat.ignored) - 5} more" if len(flat.ignored) > 5 else ""
-        named = ", ".join(name[:100] for name in flat.ignored[:5])
-        notes.append(f"parameters of no variable, which were left out: {named}{more}")
+    noted = noted_tables(structure)
+    notes: list[str] = []
     ours = bool(noted)
     if not ours:
         noted["scene"] = {"title": structure.name, "units": "SI"}

@@ -63,11 +63,14 @@ class Binding:
         How they were renamed; None where they were not.
     prefix : str
         What their names had before that.
+    unmatched : tuple of str
+        Parameters that the mapping names, and that are not there.
     """
 
     parameters: tuple[Parameter, ...]
     mapping: tuple[Mapped, ...] | None = None
     prefix: str = ""
+    unmatched: tuple[str, ...] = ()
 
     def renamed(self, parameter: Parameter) -> tuple[Parameter, ...]:
         """Return what its mapping makes of a parameter of another set; nothing where it does not name it."""
@@ -82,7 +85,8 @@ def binding(parameters: tuple[Parameter, ...], mapping: tuple[Mapped, ...] | Non
     if mapping is None:
         return Binding(tuple(replace(parameter, name=name) for name, parameter in named.items()))
     applied = (_mapped(named[entry.source], entry) for entry in mapping if entry.source in named)
-    return Binding(tuple(applied), mapping, prefix)
+    unmatched = tuple(entry.source for entry in mapping if entry.source not in named)
+    return Binding(tuple(applied), mapping, prefix, unmatched)
 
 
 def _mapped(parameter: Parameter, entry: Mapped) -> Parameter:

@@ -44,12 +44,12 @@ static double next_tick(const clock_state *s)
     return (double)(s->ticks + 1) * s->period;
 }
 
-static int step3(void *instance, double time, double size, bool last, bool *event, bool *ends, bool *early,
+static int step3(void *instance, double time, double size, bool no_state_prior, bool *event, bool *ends, bool *early,
                  double *reached)
 {
     clock_fmu *c = instance;
     clock_state *s = &c->state;
-    CHECK(!last && size > 0.0 && !c->in_event_mode, "%g", size);
+    CHECK(no_state_prior && size > 0.0 && !c->in_event_mode, "%g", size);
     if (c->liar != NULL) {
         const double answers[] = {time, time + size, time + 0.5 * size, time - size, time + 2.0 * size, (double)NAN};
         *event = choice(c->liar, 3) == 0;
@@ -66,11 +66,11 @@ static int step3(void *instance, double time, double size, bool last, bool *even
     return 0;
 }
 
-static int step2(void *instance, double time, double size, int unused)
+static int step2(void *instance, double time, double size, int no_state_prior)
 {
     clock_fmu *c = instance;
     clock_state *s = &c->state;
-    CHECK(unused == 0 && size > 0.0, "%g", size);
+    CHECK(no_state_prior == 1 && size > 0.0, "%g", size);
     const double tick = next_tick(s);
     if (c->liar != NULL) {
         s->event_time = choice(c->liar, 2) == 0 ? (double)NAN : uniform(c->liar, time - size, time + 2.0 * size);
@@ -231,6 +231,7 @@ static vi_coupling_plan plan_of(int count)
                               .decisions = decisions,
                               .deciding = deciding,
                               .most_iterations = 100,
+                              .no_state_prior = 1,
                               .same_instant = 1e-13,
                               .time_rounding = 1e-9,
                               .step_rounding = 1e-6,
@@ -301,6 +302,25 @@ static void events_without_room_are_left_to_the_caller(uint64_t *seed)
     CHECK(run.events_used == run.events_room && progress.time == left - 0.5, "%g", progress.time);
 }
 
+/* A component of one size of steps is given exactly that, and no step that another's event or the end has cut. */
+static void a_component_of_one_step_size_is_given_no_other(uint64_t *seed)
+{
+    const double step = 1e-3, period = 1e-3 * (1.5 + (double)choice(seed, 40));
+    make(0, VERSION_3, choice(seed, 2) == 0 ? period : 1e9, NULL);
+    make(1, choice(seed, 2) == 0 ? VERSION_2 : VERSION_3, 1e9, NULL);
+    components[1].only_step = step;
+    const vi_coupling_plan plan = plan_of(2);
+    vi_coupling_progress progress = from_zero(step);
+    vi_coupling_run run = run_to(0.1, step);
+    const int came_to = vi_door_coupling(&plan, &progress, &run);
+    if (clocks[0].state.period == period) {
+        CHECK(came_to == VI_COUPLING_CUT && run.at == 1, "%d at %d", came_to, run.at);
+        CHECK(clocks[1].state.time < period && run.goal == period, "%g of %g", run.goal, period);
+    } else {
+        CHECK(came_to == VI_COUPLING_DONE && clocks[1].step_size == step, "%d, %.17g", came_to, clocks[1].step_size);
+    }
+}
+
 /* Whatever they answer: the loop comes back with one of its reasons, and nobody's time goes back or beyond the end. */
 static void liars_end_the_loop_and_never_hold_it(uint64_t *seed)
 {
@@ -315,7 +335,7 @@ static void liars_end_the_loop_and_never_hold_it(uint64_t *seed)
     double before = 0.0;
     for (int call = 0; call < 20; ++call) {
         const int came_to = vi_door_coupling(&plan, &progress, &run);
-        CHECK(came_to >= VI_COUPLING_DONE && came_to <= VI_COUPLING_ENDLESS, "%d", came_to);
+        CHECK(came_to >= VI_COUPLING_DONE && came_to <= VI_COUPLING_ENDLESS, "%d", came_to); /* none has one size */
         CHECK(progress.time >= before && progress.time <= run.end, "%g after %g", progress.time, before);
         CHECK(came_to != VI_COUPLING_FAILED || run.status < 0 || run.status > 1, "%d", run.status);
         CHECK(run.arrived <= count && run.events_used <= EVENTS, "%d", run.arrived);
@@ -333,6 +353,7 @@ int main(void)
     for (int k = 0; k < 300; ++k) {
         every_clock_ticks_at_its_instants(&seed);
         events_without_room_are_left_to_the_caller(&seed);
+        a_component_of_one_step_size_is_given_no_other(&seed);
     }
     for (int k = 0; k < 3000; ++k) {
         liars_end_the_loop_and_never_hold_it(&seed);

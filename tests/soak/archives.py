@@ -120,7 +120,18 @@ def description(draw: random.Random) -> bytes:
         token=pick(["instantiationToken", "instantiationToken", "guid", "Token"]),
         value=pick(["{t}", "", "x" * 5000, "&#10;"]),
         identifier=pick(["Hostile", "Hostile", "../Hostile", "a/b", "", "x" * 400, "..", ".", "&#x202e;x"]),
-        more=pick(["", "", ' canHandle="maybe"', ' hasEventMode="true"', ' a:b="c"']),
+        more=pick(
+            [
+                "",
+                "",
+                ' canHandle="maybe"',
+                ' hasEventMode="true"',
+                ' a:b="c"',
+                ' fixedInternalStepSize="NaN"',
+                ' fixedInternalStepSize="-1" canHandleVariableCommunicationStepSize="true"',
+                ' canBeInstantiatedOnlyOncePerProcess="1" needsExecutionTool="true"',
+            ]
+        ),
         middle=pick(
             ["", "", "<UnitDefinitions/>", "<a>" * 3000 + "</a>" * 3000, "<!-- " + "-" * 10 + " -->"]
         ),

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 import tempfile
 import uuid
+import zipfile
+from collections.abc import Sequence
 from functools import cache, partial
 from pathlib import Path
 
@@ -23,13 +25,17 @@ SOURCES = Path(__file__).with_name("fmus")
 MODELS = {
     "BouncingBall": "ball.c",
     "Buffer": "buffer.c",
+    "Clocked": "clocked.c",
     "Faulty": "faulty.c",
     "Gain": "gain.c",
     "Mass": "mass.c",
+    "Single": "single.c",
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
 }
-MADE = tuple((name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (name, fmi) != ("Gain", "3.0"))
+MADE = tuple(
+    (name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (SOURCES / f"{name}.fmi{fmi[0]}.xml").exists()
+)
 
 
 def bouncing_ball(folder: Path, fmi: str = "2.0") -> Path:
@@ -56,6 +62,20 @@ def buffer(folder: Path, fmi: str = "3.0") -> Path:
     return _write("Buffer", fmi, folder)
 
 
+def clocked(folder: Path) -> Path:
+    """Write a sampler of FMI 3.0 with two input clocks, whose variables may be touched only while their clock ticks.
+
+    Input `u`; outputs `y` (10 times the ticks, and `u`, of the last tick), `ticks`, `late_ticks`, `sum`; parameters
+    `interval` and `shift` (s) of its second clock.
+    """
+    return _write("Clocked", "3.0", folder)
+
+
+def single(folder: Path, fmi: str = "3.0") -> Path:
+    """Write an integrator y' = u of which a process may have one instance: `y` is one variable of the process."""
+    return _write("Single", fmi, folder)
+
+
 def faulty(folder: Path, fmi: str = "3.0") -> Path:
     """Write an integrator y' = u with the parameters `fault` (what goes wrong) and `fault_time`."""
     return _write("Faulty", fmi, folder)
@@ -73,6 +93,21 @@ def mass(folder: Path, fmi: str = "3.0", *, states: bool = True) -> Path:
     `inner_step`: how it integrates.
     """
     return _write("Mass" if states else "StatelessMass", fmi, folder)
+
+
+def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:
+    """Write an FMU with another description: each first text, which must be there, becomes the second."""
+    with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as changed:
+        for name in archive.namelist():
+            content = archive.read(name)
+            if name == "modelDescription.xml":
+                text = content.decode()
+                for old, new in replacements:
+                    assert old in text
+                    text = text.replace(old, new)
+                content = text.encode()
+            changed.writestr(name, content)
+    return target
 
 
 def _write(name: str, fmi: str, folder: Path) -> Path:
@@ -107,23 +142,24 @@ def _compile(name: str, fmi: str, adapter: Path, library: Path) -> None:
         generated = Path(folder)
         (generated / "token.h").write_text(f'#define TOKEN "{_token(name, fmi)}"\n', encoding="ascii")
         rest = generated / "rest.c"
-        rest.write_text(_functions_left_out(adapter, fmi), encoding="ascii")
+        rest.write_text(_functions_left_out([adapter, SOURCES / MODELS[name]], fmi), encoding="ascii")
         # not strict: the headers' own empty parameter lists are a warning for some compilers
         sources = [adapter, SOURCES / MODELS[name], rest]
         compile_library(library, sources, [SOURCES, generated, fmi_headers()], export_all=True, strict=False)
 
 
-def _functions_left_out(adapter: Path, fmi: str) -> str:
-    """Return C for the functions of the standard that an adapter has not: they answer error, or no instance.
+def _functions_left_out(sources: Sequence[Path], fmi: str) -> str:
+    """Return C for the functions of the standard that no source has: they answer error, or no instance.
 
     They take no arguments, as they look at none: in C's calling conventions the caller clears them away.
     """
     major = fmi[0]
     header = (fmi_headers() / f"fmi{major}Functions.h").read_text(encoding="utf-8", errors="replace")
     declared = re.findall(rf"FMI{major}_Export\s+fmi{major}\w+TYPE\s+(fmi{major}\w+);", header)
-    defined = set(
-        re.findall(rf"^\w.*?\b(fmi{major}\w+)\(", adapter.read_text(encoding="utf-8"), re.MULTILINE)
-    )
+    texts = [source.read_text(encoding="utf-8") for source in sources]
+    defined = {
+        name for text in texts for name in re.findall(rf"^\w.*?\b(fmi{major}\w+)\(", text, re.MULTILINE)
+    }
     lines = [_refusal(function) for function in dict.fromkeys(declared) if function not in defined]
     return "\n".join(lines)
 

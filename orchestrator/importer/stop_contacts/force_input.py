@@ -16,6 +16,11 @@ TRIAL_STEP, TRIAL_CHANGE, TRIALS = 1e-3, 1e-3, 40
 VISIBLE = 1e-9
 #: Deviation from the mass alone at which a trial step is short enough, and below which there is none.
 NEARLY, ALONE = 0.1, 1e-6
+#: What is said of a body that takes no steps of other sizes, though its description declares that it does.
+OWN_STEPS = (
+    "A body that makes steps of its own takes no [[contact]]: its description should say so "
+    "(canHandleVariableCommunicationStepSize = false, fixedInternalStepSize)."
+)
 #: Largest relative difference between a mass that is given and the one that a trial step finds.
 MASS_TOLERANCE = 0.05
 
@@ -124,9 +129,11 @@ class TrialSteps:
         ComponentError
             Neither agrees.
         """
-        found = [self.found_mass(time, trial, size) for trial in (TRIAL_STEP * size, size)]
+        trials = (TRIAL_STEP * size, size)
+        found = [self.found_mass(time, trial, size) for trial in trials]
         answers = [mass for mass in found if math.isfinite(mass)]
         if answers and not any(agrees(given, mass) for mass in answers):
+            self._refuse_own_steps(trials, found, time)
             raise self.mass_error(given, answers, time)
 
     def rate(self, mass: float, time: float, size: float) -> float:
@@ -144,6 +151,30 @@ class TrialSteps:
                     return math.sqrt(6.0 * abs(1.0 - answer)) / size if abs(1.0 - answer) > ALONE else 0.0
                 size *= 0.5
         return 0.0
+
+    def measured_mass(self, time: float, size: float) -> float:
+        """Return the effective mass of the point by a part of a communication step of `size` s, kg.
+
+        Raises
+        ------
+        ComponentError
+            The whole step changes the velocity as the part does.
+        """
+        trials = (TRIAL_STEP * size, size)
+        found = [self.found_mass(time, trial, size) for trial in trials]
+        self._refuse_own_steps(trials, found, time)
+        return found[0]
+
+    def _refuse_own_steps(self, trials: Sequence[float], found: Sequence[float], time: float) -> None:
+        """Raise the error of a body that makes one step of its own, whatever size it is asked for."""
+        if not (all(map(math.isfinite, found)) and agrees(found[0], TRIAL_STEP * found[1])):
+            return
+        raise ComponentError(
+            f"{self.name}: expected a velocity that a force changes the more the longer a trial step is, got the same "
+            f"change over {trials[0]:.3g} s and {trials[1]:.3g} s at time {time:.12g}. {OWN_STEPS}",
+            instance=self.body.name,
+            time=time,
+        )
 
     def mass_error(self, given: float, found: Sequence[float], time: float) -> ComponentError:
         """Return the error of a mass that is none of those that trial steps find."""

@@ -28,7 +28,12 @@ from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import (
     ContactWork,
     depth_that_stops,
 )
-from vibroimpact.orchestrator.importer.stop_contacts.force_input import TRIAL_STEP, ForceInput, TrialSteps
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import (
+    OWN_STEPS,
+    TRIAL_STEP,
+    ForceInput,
+    TrialSteps,
+)
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import PART
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
 
@@ -329,13 +334,13 @@ class HeldForceBond:
 
     def _found_mass(self, size: float) -> float:
         """The effective mass of the contact point, by steps with and without a small force, kg."""
-        mass = self._trials.found_mass(self._time, TRIAL_STEP * size, size)
+        mass = self._trials.measured_mass(self._time, size)
         if not (mass > 0.0 and math.isfinite(mass)):
             got = "one that does not change" if math.isnan(mass) else f"an effective mass of {mass:.3g} kg"
             raise ComponentError(
                 f"{self.contact.body}.{self.contact.velocity}: expected a velocity that grows with the force "
                 f"{self.contact.force}, got {got} in a trial step at time {self._time:.12g}. "
-                "Look at the variables and signs of [[contact]], or give its mass.",
+                f"Look at the variables and signs of [[contact]], or give its mass. {OWN_STEPS}",
                 instance=self.contact.body,
                 time=self._time,
             )

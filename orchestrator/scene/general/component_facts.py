@@ -13,9 +13,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from vibroimpact.fmus.packaging.archive import content_hash
+from vibroimpact.fmus.packaging.archive import content_hash, unpack
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, read_description
 from vibroimpact.fmus.units import BASE_UNITS, Unit, declared_unit
+from vibroimpact.orchestrator.fmi.capabilities import Capabilities, capabilities_of
 from vibroimpact.orchestrator.scene.problems import nearest
 
 StartValue = float | int | bool | str
@@ -90,25 +91,34 @@ class VariableFacts:
 
 @dataclass(frozen=True, slots=True)
 class ComponentFacts:
-    """An FMU: its file, its variables by name, whether it steps itself, whether its state can be kept.
+    """An FMU: its file, its variables by name, whether it steps itself, what it declares of that.
 
     Attributes
     ----------
     scheduled : bool
         It can be run by scheduled execution.
-    event_mode : bool
-        It handles events in event mode when it steps itself.
     step : float or None
         Communication step that it proposes, s.
+    capabilities : Capabilities
+        What it declares of its co-simulation.
     """
 
     file: str
     variables: Mapping[str, VariableFacts]
     co_simulation: bool
-    restorable: bool
     scheduled: bool
-    event_mode: bool
-    step: float | None = None
+    step: float | None
+    capabilities: Capabilities
+
+    @property
+    def restorable(self) -> bool:
+        """Whether its state can be kept and restored."""
+        return self.capabilities.restorable
+
+    @property
+    def event_mode(self) -> bool:
+        """Whether it handles events in event mode when it steps itself."""
+        return self.capabilities.event_mode
 
 
 def component_facts(path: Path) -> ComponentFacts:
@@ -127,15 +137,13 @@ def _facts(sha256: str, path: Path) -> ComponentFacts:
     description: ModelDescription = read_description(path)
     units = {unit.name: _unit(unit) for unit in description.unitDefinitions}
     variables = {variable.name: _variable(variable, units) for variable in description.modelVariables}
-    stepped = description.coSimulation
     return ComponentFacts(
         path.name,
         variables,
-        co_simulation=stepped is not None,
-        restorable=stepped is not None and stepped.canGetAndSetFMUstate,
+        co_simulation=description.coSimulation is not None,
         scheduled=description.scheduledExecution is not None,
-        event_mode=stepped is not None and bool(getattr(stepped, "hasEventMode", False)),
         step=_proposed_step(description),
+        capabilities=capabilities_of(description, unpack(path).folder),
     )
 
 

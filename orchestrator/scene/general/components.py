@@ -12,6 +12,8 @@ from typing import Any
 
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.archive import content_hash
+from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
 from vibroimpact.orchestrator.scene.general.component_facts import (
     ComponentFacts,
     Misfit,
@@ -71,7 +73,22 @@ def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[st
         hint = 'Write [component.ball] and below it fmu = "ball.fmu".'
         problems.append(Problem("component", "one [component.NAME] table for each FMU", got, hint))
         return {}
-    return {name: _read_component(name, table, folder, problems) for name, table in raw.items()}
+    found = {name: _read_component(name, table, folder, problems) for name, table in raw.items()}
+    problems += _only_instances(found)
+    return found
+
+
+def _only_instances(components: Mapping[str, DraftComponent]) -> Iterator[Problem]:
+    """Yield each component beyond the first of an FMU of which a process may have one instance."""
+    first: dict[str, str] = {}
+    for name, component in components.items():
+        facts = component.facts
+        if component.fmu is None or facts is None or not facts.capabilities.only_once:
+            continue
+        other = first.setdefault(content_hash(component.fmu), name)
+        if other != name:
+            got = f"{facts.file}, of which {other} is one ({ONLY_ONCE})"
+            yield Problem(key_path(("component", name, "fmu")), "another FMU", got)
 
 
 def _read_component(name: str, raw: object, folder: Path, problems: list[Problem]) -> DraftComponent:
@@ -160,6 +177,11 @@ def _facts(fmu: Path, where: str, problems: list[Problem]) -> ComponentFacts | N
         other = "scheduled execution" if facts.scheduled else "model exchange"
         hint = f"Export it for co-simulation: {other} is not available in this version."
         problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} for {other} only", hint))
+    for needed in facts.capabilities.refusals:
+        expected = (
+            "an FMU whose clocks are input clocks of a constant or fixed interval, and that has an event mode"
+        )
+        problems.append(Problem(where, expected, f"{needed} of {facts.file}"))
     return facts
 
 

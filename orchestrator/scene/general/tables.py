@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.scene.general.models import (
 from vibroimpact.orchestrator.scene.general.pair_rules import PortPlan, plan_ports
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable, mass_place
+from vibroimpact.orchestrator.scene.general.step_rules import step_problems
 from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep
 from vibroimpact.orchestrator.scene.models import Execution, Record
 from vibroimpact.orchestrator.scene.problems import Problem
@@ -42,6 +43,7 @@ def read_general(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, A
         *general_problems(draft),
         *contact_problems(draft),
         *plan.problems,
+        *step_problems(draft),
         *sweep_problems,
     ]
     if problems:

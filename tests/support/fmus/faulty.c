@@ -50,7 +50,8 @@ enum {
     FAULT_CLOSE_FILES,
     FAULT_KILL_PARENT,
     FAULT_ENDLESS_LOG,
-    FAULT_BY_INPUT
+    FAULT_BY_INPUT,
+    FAULT_PENDING
 };
 /* s; a lie that lies beyond every run */
 #define BEYOND 360000.0
@@ -251,6 +252,8 @@ static step_answer misbehave(model *m, double time, void *instance)
     case FAULT_NOT_A_NUMBER:
         m->value[Y] = NAN;
         break;
+    case FAULT_PENDING:
+        return STEP_PENDS;
     case FAULT_TERMINATE:
         return STEP_TERMINATES;
     case FAULT_STALL:
@@ -283,6 +286,9 @@ static bool is_due(const model *m, occasion where)
 step_answer model_at(model *m, occasion where, void *instance)
 {
     const char *told = where == AT_INSTANTIATE ? getenv("VIBROIMPACT_FAULTY_INSTANTIATE") : NULL;
+    if (told != NULL && atoi(told) == FAULT_REFUSE) {
+        return STEP_FAILS;
+    }
     if (told != NULL) {
         (void)misbehave_anywhere(atoi(told), 0.0, instance);
     }

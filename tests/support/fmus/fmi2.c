@@ -13,6 +13,8 @@
 
 typedef struct {
     model m;
+    model before;          /* the last step */
+    double no_going_before; /* the importer has said that it goes back to no state of a time before, s */
     fmi2CallbackFunctions callbacks;
     bool terminated;
     char name[64];
@@ -73,16 +75,16 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     (void)resources, (void)visible, (void)logging;
-    if (type != fmi2CoSimulation || strcmp(guid, TOKEN) != 0) {
+    if (type != fmi2CoSimulation || strcmp(guid, TOKEN) != 0 || callbacks->allocateMemory == NULL) {
         return NULL;
     }
-    instance2 *i = calloc(1, sizeof *i);
+    instance2 *i = callbacks->allocateMemory(1, sizeof *i); /* not by functions of its own */
     if (i != NULL) {
         i->callbacks = *callbacks;
         strncpy(i->name, name, sizeof i->name - 1);
         model_start(&i->m);
         if (at(i, AT_INSTANTIATE) != fmi2OK) {
-            free(i);
+            callbacks->freeMemory(i);
             return NULL;
         }
     }
@@ -92,15 +94,16 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 void fmi2FreeInstance(fmi2Component c)
 {
     (void)at(c, AT_FREE);
-    free(c);
+    of(c)->callbacks.freeMemory(c);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean stop_defined, fmi2Real stop)
 {
     (void)stop_defined, (void)stop;
-    of(c)->m.time = start;
+    of(c)->m.time = of(c)->no_going_before = start;
     of(c)->m.tolerance = tolerance_defined ? tolerance : 0.0;
+    of(c)->before = of(c)->m;
     return fmi2OK;
 }
 
@@ -136,7 +139,8 @@ fmi2Status fmi2Reset(fmi2Component c)
 
 static double *place(fmi2Component c, fmi2ValueReference reference)
 {
-    return reference < MODEL_VALUES ? &of(c)->m.value[reference] : NULL;
+    const bool is_open = reference < MODEL_VALUES && (of(c)->m.closed >> reference & 1U) == 0U;
+    return is_open ? &of(c)->m.value[reference] : NULL;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[])
@@ -238,6 +242,10 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
     if (!model_has_state || state == NULL) {
         return fmi2Error;
     }
+    if (((const model *)state)->time < of(c)->no_going_before - TIME_TOLERANCE) {
+        say(c, "a state before the point that no state is before", 0, ((const model *)state)->time);
+        return fmi2Error;
+    }
     memcpy(&of(c)->m, state, sizeof(model));
     of(c)->terminated = false;
     return fmi2OK;
@@ -282,12 +290,17 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_state_before)
 {
     model *m = &of(c)->m;
-    (void)no_state_before;
     if (fabs(time - m->time) > TIME_TOLERANCE * (1.0 + fabs(time)) || !(size > 0.0)) {
         say(c, "wrong communication point or step size", 0, time);
         return fmi2Error;
     }
+    if (!no_state_before && of(c)->before.time < time) {
+        memcpy(m->value, of(c)->before.value, sizeof m->value); /* the last step is not accepted */
+    } else if (no_state_before) {
+        of(c)->no_going_before = time;
+    }
     m->time = time;
+    of(c)->before = *m;
     const step_answer answer = model_step(m, size, c);
     of(c)->terminated = answer == STEP_TERMINATES || answer == STEP_ENDS_SHORT || answer == STEP_SAYS;
     switch (answer) {
@@ -295,6 +308,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
         return fmi2Error;
     case STEP_FATAL:
         return fmi2Fatal;
+    case STEP_PENDS:
+        return fmi2Pending;
     case STEP_STALLS:
         return fmi2Discard;
     case STEP_DISCARDS:

@@ -14,6 +14,8 @@
 
 typedef struct {
     model m;
+    model before;          /* the last step */
+    double no_going_before; /* the importer has said that it goes back to no state of a time before, s */
     bool event_mode_used;
     bool in_event_mode;
     fmi3LogMessageCallback log;
@@ -73,9 +75,9 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update)
 {
-    (void)name, (void)resources, (void)visible, (void)logging, (void)update;
-    (void)intermediate, (void)intermediate_count;
-    if (strcmp(token, TOKEN) != 0 || (event_mode_used && !model_has_event_mode)) {
+    (void)name, (void)resources, (void)visible, (void)logging, (void)intermediate;
+    const bool wants_intermediate_updates = update != NULL || intermediate_count > 0;
+    if (strcmp(token, TOKEN) != 0 || wants_intermediate_updates || (event_mode_used && !model_has_event_mode)) {
         return NULL;
     }
     instance3 *i = calloc(1, sizeof *i);
@@ -103,8 +105,9 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
                                        fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop)
 {
     (void)stop_defined, (void)stop;
-    of(c)->m.time = start;
+    of(c)->m.time = of(c)->no_going_before = start;
     of(c)->m.tolerance = tolerance_defined ? tolerance : 0.0;
+    of(c)->before = of(c)->m;
     return at(c, AT_ENTER_INITIALIZATION);
 }
 
@@ -138,7 +141,8 @@ fmi3Status fmi3Reset(fmi3Instance c)
 
 static double *place(fmi3Instance c, fmi3ValueReference reference)
 {
-    return reference < MODEL_VALUES ? &of(c)->m.value[reference] : NULL;
+    const bool is_open = reference < MODEL_VALUES && (of(c)->m.closed >> reference & 1U) == 0U;
+    return is_open ? &of(c)->m.value[reference] : NULL;
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count, fmi3Float64 values[],
@@ -244,6 +248,10 @@ fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
     if (!model_has_state || state == NULL) {
         return fmi3Error;
     }
+    if (((const model *)state)->time < of(c)->no_going_before - TIME_TOLERANCE) {
+        say(c, "a state before the point that no state is before", 0, ((const model *)state)->time);
+        return fmi3Error;
+    }
     memcpy(&of(c)->m, state, sizeof(model));
     return fmi3OK;
 }
@@ -288,12 +296,17 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
                       fmi3Boolean *needs_event, fmi3Boolean *terminates, fmi3Boolean *early, fmi3Float64 *last_time)
 {
     model *m = &of(c)->m;
-    (void)no_state_before;
     if (fabs(time - m->time) > TIME_TOLERANCE * (1.0 + fabs(time)) || !(size > 0.0) || of(c)->in_event_mode) {
         say(c, "wrong communication point, step size or mode", of(c)->in_event_mode, time);
         return fmi3Error;
     }
+    if (!no_state_before && of(c)->before.time < time) {
+        memcpy(m->value, of(c)->before.value, sizeof m->value); /* the last step is not accepted */
+    } else if (no_state_before) {
+        of(c)->no_going_before = time;
+    }
     m->time = time;
+    of(c)->before = *m;
     const step_answer answer = model_step(m, size, c);
     const double share = answer == STEP_STALLS ? 0.0 : answer == STEP_DISCARDS ? 0.5 : 1.0;
     const bool short_of_end = answer == STEP_ENDS_SHORT || answer == STEP_EVENT_EARLY;
@@ -303,6 +316,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     *early = answer == STEP_STALLS || answer == STEP_EVENT_EARLY || (answer == STEP_SAYS && m->says_early);
     *last_time = answer == STEP_SAYS || answer == STEP_SOLVER_BEHIND ? m->reached : m->time;
     switch (answer) {
+    case STEP_PENDS:
     case STEP_FAILS:
         return fmi3Error;
     case STEP_FATAL:

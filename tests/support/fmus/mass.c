@@ -7,7 +7,7 @@
 #include "model.h"
 
 enum { X = 1, V, F, MASS, STIFFNESS, LOAD, SCHEME, INNER_STEP };
-enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER, GRID, CLIPPED };
+enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER, GRID, CLIPPED, ONE_SIZE };
 
 static const double most_force = 1e6;
 
@@ -76,6 +76,11 @@ step_answer model_step(model *m, double size, void *instance)
     (void)instance;
     if (x[SCHEME] == EXACT || x[SCHEME] == CLIPPED) {
         flow(x, size);
+        return STEP_DONE;
+    }
+    if (x[SCHEME] == ONE_SIZE) {
+        x[INNER_STEP] = x[INNER_STEP] > 0.0 ? x[INNER_STEP] : size;
+        flow(x, x[INNER_STEP]); /* whatever size it is asked for */
         return STEP_DONE;
     }
     if (x[SCHEME] == GRID) {

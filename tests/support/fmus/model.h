@@ -32,6 +32,7 @@ typedef struct {
     bool says_early;            /* STEP_SAYS: early return */
     bool early_allowed;         /* the importer handles event mode and early return */
     double tolerance;           /* relative, that the importer has given; 0: none */
+    unsigned closed;            /* bits of the value references that may not be read or written now */
 } model;
 
 typedef enum {
@@ -44,6 +45,7 @@ typedef enum {
     STEP_EVENT_EARLY, /* FMI 3.0: the step has ended at `reached` and asks for event mode */
     STEP_SAYS,        /* done; says that it has ended at `reached` (FMI 2.0: with discard, and terminated) */
     STEP_SOLVER_BEHIND, /* done; the solver is at `reached`, which is what FMI 3.0 is told */
+    STEP_PENDS, /* FMI 2.0: goes on by itself; FMI 3.0 has no such answer */
     STEP_FAILS,
     STEP_FATAL
 } step_answer;

@@ -94,11 +94,11 @@ static int call_step(const vi_coupling_plan *plan, const vi_coupling_component *
     *plan->noted_call = c->step.note;
     *plan->noted_time = *c->step_time;
     if (c->step.kind == VI_CALL_STEP2) {
-        return c->step.function.step2(c->step.instance, *c->step_time, *c->step_size, 0);
+        return c->step.function.step2(c->step.instance, *c->step_time, *c->step_size, plan->no_state_prior);
     }
     bool *flags = (bool *)c->flags;
-    return c->step.function.step3(c->step.instance, *c->step_time, *c->step_size, false, &flags[0], &flags[1],
-                                  &flags[2], c->last_time);
+    return c->step.function.step3(c->step.instance, *c->step_time, *c->step_size, plan->no_state_prior != 0, &flags[0],
+                                  &flags[1], &flags[2], c->last_time);
 }
 
 /* Take where an FMI 3.0 component says that its step has ended; false where that is not for this loop to judge. */
@@ -138,6 +138,16 @@ static double reported(const vi_coupling_plan *plan, vi_coupling_component *c, c
     return *is_there ? goal : first;
 }
 
+/* The size of a step to the goal as a component takes it, which is one size alone for some; 0 where it takes no such. */
+static double size_of_step(const vi_coupling_plan *plan, const vi_coupling_component *c, const vi_coupling_run *r)
+{
+    const double size = r->goal - r->start;
+    if (c->only_step == 0.0) {
+        return size;
+    }
+    return fabs(size - c->only_step) <= plan->step_rounding * c->only_step ? c->only_step : 0.0;
+}
+
 /* Step component `i` towards the goal; `reached` is where its first event is, or the goal. */
 static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i, double *reached, bool *has_event)
 {
@@ -145,8 +155,11 @@ static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i,
     *reached = r->goal;
     *has_event = false;
     *c->step_time = r->start;
-    *c->step_size = r->goal - r->start;
+    *c->step_size = size_of_step(plan, c, r);
     r->at = i;
+    if (*c->step_size == 0.0) {
+        return VI_COUPLING_CUT;
+    }
     r->status = call_step(plan, c);
     if (!went_well(r->status) || !rounding_is_usual()) {
         return VI_COUPLING_STEPPED;

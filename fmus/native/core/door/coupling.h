@@ -20,7 +20,8 @@ enum {
     VI_COUPLING_STEPPED = 2, /* component `at` has made its step, which returned `status`: the importer's to judge */
     VI_COUPLING_REACHED = 3, /* all components are at the end of a step, which is the importer's to finish */
     VI_COUPLING_FAILED = 4,  /* call `at` returned `status` */
-    VI_COUPLING_ENDLESS = 5  /* the events at this time do not settle */
+    VI_COUPLING_ENDLESS = 5, /* the events at this time do not settle */
+    VI_COUPLING_CUT = 6      /* component `at` takes steps of another size than that to `goal` */
 };
 
 /* What a call is. */
@@ -72,6 +73,7 @@ typedef struct {
     int32_t event_mode, may_return_early;
     int32_t number; /* by which its events are told */
     double internal_step; /* s */
+    double only_step;     /* the one size of its steps, s; 0: any */
     /* What its step is given and answers, in the memory of the importer's instance; `flags` are those of FMI 3.0: needs
      * event mode, ends, has returned early. */
     double *step_time, *step_size, *last_time;
@@ -88,6 +90,7 @@ typedef struct {
     vi_coupling_calls begin, again, leave; /* of event mode */
     const unsigned char *const *decisions; /* [deciding] of event mode: another iteration, the end */
     int32_t deciding, most_iterations;
+    int32_t no_state_prior; /* noSetFMUStatePriorToCurrentPoint of every step */
     double same_instant, time_rounding, step_rounding; /* the importer's tolerances */
     volatile int64_t *noted_call; /* the call under way is noted there */
     volatile double *noted_time;  /* and the start of a step */

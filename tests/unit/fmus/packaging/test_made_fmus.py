@@ -10,7 +10,13 @@ from pathlib import Path
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Component
+from fmpy.fmi2 import (
+    FMU2Slave,
+    defaultCallbacks,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2Component,
+)
 from fmpy.fmi3 import FMU3Slave
 from harness import warm
 from support import fmu_factory
@@ -20,9 +26,11 @@ from vibroimpact.fmus.packaging.check import check_fmu
 WRITERS = {
     "BouncingBall": fmu_factory.bouncing_ball,
     "Buffer": fmu_factory.buffer,
+    "Clocked": lambda folder, _: fmu_factory.clocked(folder),
     "Faulty": fmu_factory.faulty,
     "Gain": lambda folder, _: fmu_factory.gain(folder),
     "Mass": fmu_factory.mass,
+    "Single": fmu_factory.single,
     "StatelessMass": lambda folder, fmi: fmu_factory.mass(folder, fmi, states=False),
     "SteppedBall": fmu_factory.stepped_ball,
 }
@@ -268,7 +276,8 @@ def faulty(tmp_path: Path, fmi: str, fault: int) -> tuple[FMU2Slave | FMU3Slave,
     else:
         # the fifth argument is the format: what follows it is out of Python's reach
         logger = fmi2CallbackLoggerTYPE(lambda *a: lines.append(a[4]))
-        fmu.instantiate(callbacks=fmi2CallbackFunctions(logger=logger))
+        memory = defaultCallbacks.allocateMemory, defaultCallbacks.freeMemory
+        fmu.instantiate(callbacks=fmi2CallbackFunctions(logger, *memory))
         fmu.setInteger([FAULT], [fault])
         initialize(fmu)
     return fmu, lines

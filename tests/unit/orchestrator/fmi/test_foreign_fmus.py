@@ -291,22 +291,8 @@ def test_a_component_that_changes_the_rounding_is_named_and_changes_no_other_com
 # ---- what this importer does not import ----
 
 
-def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:
-    with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as changed:
-        for name in archive.namelist():
-            content = archive.read(name)
-            if name == "modelDescription.xml":
-                text = content.decode()
-                for old, new in replacements:
-                    assert old in text
-                    text = text.replace(old, new)
-                content = text.encode()
-            changed.writestr(name, content)
-    return target
-
-
 def test_fmi_1_is_called_by_its_name(folder: Path, tmp_path: Path) -> None:
-    old = redescribed(
+    old = fmu_factory.redescribed(
         folder / "Faulty.fmi2.fmu", tmp_path / "old.fmu", ('fmiVersion="2.0"', 'fmiVersion="1.0"')
     )
     with pytest.raises(ComponentFileError, match=r"old\.fmu: modelDescription\.xml: .*got FMI 1\.0\. "):
@@ -314,7 +300,7 @@ def test_fmi_1_is_called_by_its_name(folder: Path, tmp_path: Path) -> None:
 
 
 def test_scheduled_execution_is_called_by_its_name(folder: Path, tmp_path: Path) -> None:
-    redescribed(
+    fmu_factory.redescribed(
         folder / "SteppedBall.fmi3.fmu",
         tmp_path / "clocks.fmu",
         ("<CoSimulation", "<ScheduledExecution"),

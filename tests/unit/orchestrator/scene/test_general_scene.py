@@ -66,10 +66,11 @@ def write_fmu(
 ) -> Path:
     """Write an FMU that has a description only: enough for everything that is said before a run."""
     outputs = "".join(f'<Output valueReference="{r}"/>' for r in (1, 2, 9))
+    steps = ' canHandleVariableCommunicationStepSize="true"' if interface == "CoSimulation" else ""
     description = (
         '<?xml version="1.0" encoding="UTF-8"?>'
         '<fmiModelDescription fmiVersion="3.0" modelName="Ball" instantiationToken="{ball}">'
-        f'<{interface} modelIdentifier="ball" canGetAndSetFMUState="{str(restorable).lower()}"/>'
+        f'<{interface} modelIdentifier="ball" canGetAndSetFMUState="{str(restorable).lower()}"{steps}/>'
         f"<UnitDefinitions>{UNITS}</UnitDefinitions>"
         '<TypeDefinitions><Float64Type name="Height" unit="m"/></TypeDefinitions>'
         f"<ModelVariables>{variables}</ModelVariables><ModelStructure>{outputs}</ModelStructure>"

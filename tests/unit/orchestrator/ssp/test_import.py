@@ -27,7 +27,7 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.packaging.description import UnitDefinition
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-from vibroimpact.orchestrator.ssp import export_system, import_system, load_system
+from vibroimpact.orchestrator.ssp import export_system, import_system, load_system, opened_scene
 
 MILLIMETRE = UnitDefinition("mm", {"m": 1}, 1e-3)
 METRE = UnitDefinition("m", {"m": 1})
@@ -155,6 +155,23 @@ def test_types_fit_their_variables_and_what_no_variable_takes_is_noted(
     (left_out, recorded) = imported.notes
     assert "body.no such, body.velocity" in left_out
     assert "record.variables" in recorded
+
+
+def test_parameters_that_nothing_has_are_said_wherever_a_system_is_opened(
+    tmp_path: Path, fmus: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    renamed = mapping(entry("weight", "mass"), entry("wieght", "stiffness"))
+    given = values({"weight": real(2.0), "label": '<ssv:String value="x"/>'}, mapping=renamed)
+    elements = body(given) + body(values({"no_such_parameter": real(250.0)}), "other")
+    path = archive(tmp_path / "wild.ssp", ssd(elements), fmus)
+    other = tmp_path / "set.ssv"
+    other.write_text(ssv({"body.mass": real(3.0), "body.mas": real(4.0)}))
+    expected = "parameters of no variable, which were left out: body.wieght, other.no_such_parameter"
+    for opened in (opened_scene, vi.import_ssp):
+        opened(path)
+        assert f"note: {expected}\n" in capsys.readouterr().err
+    vi.import_ssp(path, tmp_path / "wild.toml", parameters=other)
+    assert f"note: {expected}, body.mas\n" in capsys.readouterr().err
 
 
 def test_files_of_values_and_types_of_ssp_2_are_read(tmp_path: Path, fmus: dict[str, Path]) -> None:

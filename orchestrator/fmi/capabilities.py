@@ -1,0 +1,232 @@
+"""What an FMU declares of itself: each capability flag of FMI 2.0 and 3.0, and what an importer here makes of it.
+
+A flag is heeded, or an FMU for which it matters is refused by the name of the flag. The test of the table walks the
+schemas of both versions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from vibroimpact.orchestrator.fmi.clocks import InputClock, clocks_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from vibroimpact.fmus.packaging.fmpy_door import ModelDescription
+
+CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED = "CoSimulation", "ModelExchange", "ScheduledExecution"
+VARIABLE, CLOCK = "variable", "clock"
+
+
+class Treatment(StrEnum):
+    """What is made of a flag."""
+
+    heeded = "heeded"
+    refused = "refused"
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """A capability flag.
+
+    Attributes
+    ----------
+    name : str
+        The attribute of a model description.
+    owner : str
+        What has it: one of the interfaces, a variable, or a clock.
+    versions : str
+        Versions of FMI that have it.
+    treatment : Treatment
+        Whether it is heeded.
+    how : str
+        In which way.
+    """
+
+    name: str
+    owner: str
+    versions: str
+    treatment: Treatment
+    how: str
+
+
+def _heeded(name: str, versions: str, how: str, owner: str = CO_SIMULATION) -> Flag:
+    return Flag(name, owner, versions, Treatment.heeded, how)
+
+
+def _refused(owner: str, how: str, versions: str, *names: str) -> tuple[Flag, ...]:
+    return tuple(Flag(name, owner, versions, Treatment.refused, how) for name in names)
+
+
+VARIABLE_STEPS = "canHandleVariableCommunicationStepSize"
+INTERNAL_STEP = "fixedInternalStepSize"
+ONLY_ONCE = "canBeInstantiatedOnlyOncePerProcess"
+NEEDS_TOOL = "needsExecutionTool"
+ASYNCHRONOUS = "canRunAsynchronuously"
+EVENT_MODE = "hasEventMode"
+_COMMON = (NEEDS_TOOL, ONLY_ONCE)
+_NEVER = "no such call is made"
+_BY_INTERFACE = "an FMU for it alone is refused by its name"
+
+FLAGS: tuple[Flag, ...] = (
+    _heeded(NEEDS_TOOL, "2.0, 3.0", "named where the FMU makes no instance: its tool must be there"),
+    _heeded(ONLY_ONCE, "2.0, 3.0", "a second instance in one process is refused by this name"),
+    _heeded("canNotUseMemoryManagementFunctions", "2.0", "the functions are given to every FMU"),
+    _heeded(
+        VARIABLE_STEPS,
+        "2.0, 3.0",
+        "false: all steps have the size macro_step; a rate, a contact or an event that cuts one is refused by name",
+    ),
+    _heeded(
+        INTERNAL_STEP,
+        "3.0",
+        "a step may end so much short; a rate or a macro_step beside this grid, or a contact, is refused by name",
+    ),
+    _heeded("canGetAndSetFMUstate", "2.0", "false: no state is asked for, and no step is repeated"),
+    _heeded("canGetAndSetFMUState", "3.0", "false: no state is asked for, and no step is repeated"),
+    _heeded(
+        EVENT_MODE,
+        "3.0",
+        "true: events are resolved in event mode, at their instants; false: it is never entered",
+    ),
+    _heeded(
+        "mightReturnEarlyFromDoStep",
+        "3.0",
+        "where a step has ended is taken from the FMU, whatever it says here",
+    ),
+    *_refused(CO_SIMULATION, "a step that returns pending is refused by this name", "2.0", ASYNCHRONOUS),
+    _heeded("canInterpolateInputs", "2.0", _NEVER),
+    _heeded("maxOutputDerivativeOrder", "2.0, 3.0", _NEVER),
+    _heeded("canSerializeFMUstate", "2.0", _NEVER),
+    _heeded("canSerializeFMUState", "3.0", _NEVER),
+    _heeded("providesDirectionalDerivative", "2.0", _NEVER),
+    _heeded("providesDirectionalDerivatives", "3.0", _NEVER),
+    _heeded("providesAdjointDerivatives", "3.0", _NEVER),
+    _heeded("providesPerElementDependencies", "3.0", _NEVER),
+    _heeded("providesEvaluateDiscreteStates", "3.0", _NEVER),
+    _heeded("providesIntermediateUpdate", "3.0", "no callback is given, and no variable asked for"),
+    _heeded("canReturnEarlyAfterIntermediateUpdate", "3.0", "no callback is given that could ask for it"),
+    _heeded("recommendedIntermediateInputSmoothness", "3.0", "no input is given within a step"),
+    *_refused(
+        MODEL_EXCHANGE,
+        _BY_INTERFACE,
+        "2.0",
+        *_COMMON,
+        "completedIntegratorStepNotNeeded",
+        "canNotUseMemoryManagementFunctions",
+        "canGetAndSetFMUstate",
+        "canSerializeFMUstate",
+        "providesDirectionalDerivative",
+    ),
+    *(
+        flag
+        for interface, more in (
+            (MODEL_EXCHANGE, ("needsCompletedIntegratorStep", "providesEvaluateDiscreteStates")),
+            (SCHEDULED, ()),
+        )
+        for flag in _refused(
+            interface,
+            _BY_INTERFACE,
+            "3.0",
+            *_COMMON,
+            "canGetAndSetFMUState",
+            "canSerializeFMUState",
+            "providesDirectionalDerivatives",
+            "providesAdjointDerivatives",
+            "providesPerElementDependencies",
+            *more,
+        )
+    ),
+    *_refused(
+        VARIABLE, "it speaks of model exchange alone", "2.0, 3.0", "canHandleMultipleSetPerTimeInstant"
+    ),
+    _heeded(
+        "intervalVariability",
+        "3.0",
+        "input clocks of a constant or fixed interval tick as time events; others are refused by their names",
+        CLOCK,
+    ),
+    _heeded("canBeDeactivated", "3.0", "every clock ticks", CLOCK),
+    _heeded("supportsFraction", "3.0", "intervals are asked for as decimal numbers", CLOCK),
+)
+"""All capability flags of the two versions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What an FMU declares of its co-simulation.
+
+    Attributes
+    ----------
+    restorable : bool
+        Its state can be kept and restored.
+    event_mode : bool
+        It handles events in event mode.
+    variable_steps : bool
+        Its communication steps may have any size.
+    internal_step : float
+        Step of its own solver, s; 0: it declares none.
+    only_once : bool
+        A process may have one instance of it.
+    tool : str
+        The tool that must be there; empty where none must.
+    asynchronous : bool
+        Its steps may go on after they have returned.
+    clocks : tuple of InputClock
+        Its input clocks that tick at instants that are known.
+    refusals : tuple of str
+        What no importer here can do with it, each as "an FMU with ...".
+    """
+
+    restorable: bool = False
+    event_mode: bool = False
+    variable_steps: bool = True
+    internal_step: float = 0.0
+    only_once: bool = False
+    tool: str = ""
+    asynchronous: bool = False
+    clocks: tuple[InputClock, ...] = ()
+    refusals: tuple[str, ...] = ()
+
+    @property
+    def grid(self) -> str:
+        """What cuts of its steps are refused by; empty where they may be cut anywhere."""
+        if not self.variable_steps:
+            return f"{VARIABLE_STEPS} = false"
+        return f"{INTERNAL_STEP} = {self.internal_step:g}" if self.internal_step > 0.0 else ""
+
+
+def capabilities_of(description: ModelDescription, folder: Path) -> Capabilities:
+    """Return what an FMU declares; of one without co-simulation nothing.
+
+    Parameters
+    ----------
+    description : ModelDescription
+        Its description, as FMPy reads it.
+    folder : Path
+        Where it is unpacked: FMPy reads no intervals of clocks.
+    """
+    interface = description.coSimulation
+    if interface is None:
+        return Capabilities()
+    clocks, refusals = clocks_of(description, folder)
+    events, step = bool(interface.hasEventMode), float(interface.fixedInternalStepSize or 0.0)
+    if clocks and not events:
+        names = ", ".join(clock.name for clock in clocks)
+        refusals = (*refusals, f"the input clock {names} and {EVENT_MODE} = false")
+    tool = description.generationTool or description.modelName or "one that it does not name"
+    return Capabilities(
+        restorable=bool(interface.canGetAndSetFMUstate),
+        event_mode=events,
+        variable_steps=bool(interface.canHandleVariableCommunicationStepSize),
+        internal_step=step if math.isfinite(step) and step > 0.0 else 0.0,
+        only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
+        tool=str(tool) if interface.needsExecutionTool else "",
+        asynchronous=bool(interface.canRunAsynchronuously),
+        clocks=clocks,
+        refusals=refusals,
+    )

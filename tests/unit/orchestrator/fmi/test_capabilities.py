@@ -1,0 +1,567 @@
+"""What FMUs declare: every flag of the schemas is heeded or refused, and an FMU punishes each neglect."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element, parse
+
+import numpy as np
+import pytest
+from fmpy.fmi3 import FMU3Slave
+from support import fmu_factory
+from support.coupled_parts import link, part, values
+from support.fmu_factory import redescribed
+from support.places import ROOT
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.fmpy_door import schema_folder
+from vibroimpact.orchestrator.fmi import instance2, instance3
+from vibroimpact.orchestrator.fmi.capabilities import FLAGS, Flag, Treatment
+from vibroimpact.orchestrator.fmi.instance2 import Instance2
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.importer import plain_loop
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopContactSpec
+from vibroimpact.orchestrator.run.general import GeneralRunner
+from vibroimpact.orchestrator.scene import parse_scene
+
+XS = "{http://www.w3.org/2001/XMLSchema}"
+VERSIONS = ("2.0", "3.0")
+INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
+NO_FLAGS = {"modelIdentifier"}
+STATES = ' canGetAndSetFMU{0}="true" canSerializeFMU{0}="true"'
+MASS = """
+[scene]
+units = "SI"
+[component.m]
+fmu = "{fmu}"
+parameters = {{ v = 1.0, k = 4.0{more} }}
+[record]
+recorded_time = 0.4
+rate = {rate}
+variables = ["m.x", "m.v"]
+[execution]
+macro_step = {macro_step}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("capabilities")
+    for fmi in VERSIONS:
+        for write in (fmu_factory.mass, fmu_factory.stepped_ball, fmu_factory.faulty, fmu_factory.single):
+            write(folder, fmi)
+        fmu_factory.mass(folder, fmi, states=False)
+    fmu_factory.clocked(folder)
+    return folder
+
+
+def run(text: str, folder: Path) -> RunRecord:
+    runner = GeneralRunner(parse_scene(text, str(folder / "scene.toml")))
+    try:
+        return runner.run({})
+    finally:
+        runner.close()
+
+
+def samples_of(record: RunRecord) -> np.ndarray:
+    assert record.outcome is Outcome.ok, record.message
+    assert record.samples is not None
+    return record.samples
+
+
+def mass_samples(
+    folder: Path, fmu: str, rate: float = 100, macro_step: float = 0.01, more: str = ""
+) -> np.ndarray:
+    return samples_of(run(MASS.format(fmu=fmu, rate=rate, macro_step=macro_step, more=more), folder))
+
+
+def exact(samples: np.ndarray) -> np.ndarray:
+    """Return the motion of a mass of 1 kg on 4 N/m that leaves 0 at 1 m/s."""
+    return np.column_stack([0.5 * np.sin(2.0 * samples[:, 0]), np.cos(2.0 * samples[:, 0])])
+
+
+def described(folder: Path, source: str, *replacements: tuple[str, str]) -> str:
+    """Return the name of an FMU of the folder with another description."""
+    count = sum(1 for _ in folder.glob("described*.fmu"))
+    return redescribed(folder / source, folder / f"described{count}.fmu", *replacements).name
+
+
+# ---- the table ----
+
+
+def flags_of_schema(version: str) -> Iterator[tuple[str, str]]:
+    """Yield the owner and the name of each flag that the schema of a version has."""
+    root = schema_folder() / f"fmi{version[0]}"
+    for file in sorted(root.glob("*.xsd")):
+        for element in parse(file).getroot().iter():
+            owner = owner_of(element, version)
+            for attribute in element.iter(f"{XS}attribute") if owner in INTERFACES else ():
+                if not in_source_files(element, attribute) and attribute.get("name") not in NO_FLAGS:
+                    for one in INTERFACES if element.get("name") == "fmi3InterfaceType" else (owner,):
+                        yield one, attribute.get("name", "")
+            if owner == "CoSimulation" or owner in INTERFACES:
+                continue
+            for attribute in element.findall(f"{XS}attribute"):
+                name = attribute.get("name", "")
+                if re.match("can|needs|provides|supports|has|might", name) or name == "intervalVariability":
+                    yield ("clock" if "Clock" in element.get("name", "") else "variable"), name
+
+
+def owner_of(element: Element, version: str) -> str:
+    name = element.get("name", "")
+    if element.tag == f"{XS}element" and version == "2.0" and name in INTERFACES:
+        return name
+    if element.tag == f"{XS}complexType" and version == "3.0":
+        return "CoSimulation" if name == "fmi3InterfaceType" else name.removeprefix("fmi3")
+    return ""
+
+
+def in_source_files(interface: Element, attribute: Element) -> bool:
+    return any(attribute in list(e.iter()) for e in interface.iter(f"{XS}element") if e.get("name") == "File")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_every_flag_of_the_schema_stands_in_the_table_and_nothing_else_does(version: str) -> None:
+    of_schema = {
+        (owner, name)
+        for owner, name in flags_of_schema(version)
+        if owner in (*INTERFACES, "variable", "clock")
+    }
+    # the attributes of the interfaces are found as those of their elements too
+    interfaces = {name for owner, name in of_schema if owner in INTERFACES}
+    of_schema = {(o, n) for o, n in of_schema if o != "variable" or n not in interfaces}
+    in_table = {(flag.owner, flag.name) for flag in FLAGS if version in flag.versions.split(", ")}
+    assert in_table == of_schema
+    assert len(of_schema) > 15
+
+
+def test_the_table_of_the_page_is_that_of_the_code() -> None:
+    page = (ROOT / "docs" / "exchange.md").read_text(encoding="utf-8")
+    for flag in FLAGS:
+        if flag.owner in ("CoSimulation", "clock"):
+            assert f"| `{flag.name}` | {flag.versions} | {flag.treatment}: {flag.how} |" in page
+
+
+def test_every_heeded_flag_has_an_fmu_that_punishes_its_neglect() -> None:
+    heeded = {(flag.owner, flag.name) for flag in FLAGS if flag.treatment is Treatment.heeded}
+    assert heeded == {(flag.owner, flag.name) for flag in PUNISHED}
+
+
+# ---- a step is never taken back behind its start ----
+
+
+@pytest.mark.parametrize("steps_in_c", [True, False])
+@pytest.mark.parametrize("states", [True, False])
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_no_step_is_said_to_be_taken_back(folder: Path, fmi: str, states: bool, steps_in_c: bool) -> None:
+    # where it is, the FMU begins the step before again
+    name = "Mass" if states else "StatelessMass"
+    importer = Importer([part("m", folder / f"{name}.fmi{fmi[0]}.fmu", v=1.0, k=4.0)], macro_step=0.01)
+    importer.steps_in_c = steps_in_c
+    importer.begin()
+    importer.advance(0.4)
+    moved = values(importer, "m", "x", "v")
+    importer.free()
+    np.testing.assert_allclose(moved, [0.5 * np.sin(0.8), np.cos(0.8)], rtol=1e-12)
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_an_fmu_that_is_told_otherwise_begins_its_last_step_again(
+    folder: Path, fmi: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (instance2, instance3, plain_loop):
+        monkeypatch.setattr(module, "NO_STATE_PRIOR_TO_POINT", False)
+    importer = Importer([part("m", folder / f"Mass.fmi{fmi[0]}.fmu", v=1.0, k=4.0)], macro_step=0.01)
+    importer.begin()
+    importer.advance(0.4)
+    moved = values(importer, "m", "x")
+    importer.free()
+    assert abs(moved[0]) < 0.03
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_no_state_is_set_of_before_a_point_that_was_passed_for_good(folder: Path, fmi: str) -> None:
+    # samples, a contact with a foreign stop and its trial steps go back often, and the FMU refuses what is too far
+    mass = part("m", folder / f"Mass.fmi{fmi[0]}.fmu", v=1.0, k=4.0)
+    stop = part("s", fmu_factory.buffer(folder, fmi), k=1e3, gap=0.1)
+    contact = StopContactSpec("m", "x", "v", "f", "s", None, "d", "u", "push", "upper")
+    importer = Importer([mass, stop], contacts=[contact], macro_step=0.05)
+    importer.begin()
+    importer.advance(1.0)
+    velocity = values(importer, "m", "v")[0]
+    importer.free()
+    assert velocity < 0.0
+
+
+# ---- heeded: sizes of steps ----
+
+
+ONE_SIZE = ('canHandleVariableCommunicationStepSize="true"', 'canHandleVariableCommunicationStepSize="false"')
+
+
+@pytest.mark.parametrize("macro_step", [0.01, 1.0 / 300.0])
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_steps_of_one_size_are_kept_and_read_where_they_end(
+    folder: Path, fmi: str, macro_step: float
+) -> None:
+    fmu = described(folder, f"Mass.fmi{fmi[0]}.fmu", ONE_SIZE)
+    samples = mass_samples(folder, fmu, 1.0 / macro_step, macro_step, ", scheme = 5.0")
+    np.testing.assert_allclose(samples[:, 1:], exact(samples), atol=1e-12)
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_a_step_of_another_size_is_wrong_without_a_word_of_the_fmu(folder: Path, fmi: str) -> None:
+    # it says that its steps may have any size
+    samples = mass_samples(folder, f"Mass.fmi{fmi[0]}.fmu", 300.0, 0.01, ", scheme = 5.0")
+    assert np.max(np.abs(samples[:, 1:] - exact(samples))) > 1e-3
+
+
+@pytest.mark.parametrize("steps_in_c", [True, False])
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_an_event_that_cuts_a_step_of_one_size_is_an_error_with_the_attribute(
+    folder: Path, fmi: str, steps_in_c: bool
+) -> None:
+    fmu = folder / described(folder, f"Mass.fmi{fmi[0]}.fmu", ONE_SIZE)
+    ball = part("ball", folder / "SteppedBall.fmi3.fmu")
+    importer = Importer([part("m", fmu, scheme=5.0), ball], macro_step=0.01)
+    importer.steps_in_c = steps_in_c
+    importer.begin()
+    expected = r"m: fmi\dDoStep: expected steps of 0.01 s, since canHandleVariable.* = false, got one of"
+    with pytest.raises(ComponentError, match=expected):
+        importer.advance(2.0)
+    importer.free()
+
+
+def test_a_solver_of_fixed_steps_may_end_a_step_short_of_its_end(folder: Path) -> None:
+    declared = part("ball", folder / "SteppedBall.fmi3.fmu")
+    silent = folder / described(folder, "SteppedBall.fmi3.fmu", (' fixedInternalStepSize="1e-3"', ""))
+    importer = Importer([declared], macro_step=0.0105)
+    importer.begin()
+    importer.advance(0.3)
+    importer.free()
+    refused = Importer([part("ball", silent)], macro_step=0.0105)
+    refused.begin()
+    with pytest.raises(
+        ComponentError, match=r"has ended at time .* \(lastSuccessfulTime\), expected the end of the step"
+    ):
+        refused.advance(0.3)
+    refused.free()
+
+
+# ---- heeded: states, event mode, early return ----
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_an_fmu_without_states_is_asked_for_none(folder: Path, fmi: str) -> None:
+    fmu = f"StatelessMass.fmi{fmi[0]}.fmu"
+    samples = mass_samples(folder, fmu)
+    np.testing.assert_allclose(samples[:, 1:], exact(samples), atol=1e-12)
+    word = "state" if fmi == "2.0" else "State"
+    lies = described(folder, fmu, (f'canGetAndSetFMU{word}="false"', f'canGetAndSetFMU{word}="true"'))
+    with pytest.raises(ComponentError, match=r"m: fmi\dGetFMU[sS]tate returned error"):
+        mass_samples(folder, lies, 300.0)
+
+
+def bounces(fmu: Path) -> list[float]:
+    """Return the first bounces of a ball, to the end of the step in which it is at rest after them, s."""
+    found: list[float] = []
+    importer = Importer([part("ball", fmu)], macro_step=0.01)
+    importer.on_event = lambda event: found.append(event.time)
+    importer.begin()
+    importer.advance(1.0)
+    importer.free()
+    return found
+
+
+def test_event_mode_is_entered_where_it_is_declared_alone(folder: Path) -> None:
+    ball = folder / "SteppedBall.fmi3.fmu"
+    without = folder / described(folder, ball.name, ('hasEventMode="true"', 'hasEventMode="false"'))
+    found = bounces(ball)
+    assert len(found) >= 1
+    assert found[0] == pytest.approx(0.453, abs=1e-9)
+    assert bounces(without) == []  # its bounces are inside steps, and nobody hears of them
+    # an FMU without event mode makes no instance with it
+    with pytest.raises(ComponentError, match="InstantiateCoSimulation made no instance"):
+        Instance3(unpack(folder / "Mass.fmi3.fmu"), "m", event_mode=True)
+
+
+def test_an_early_return_counts_whether_it_was_announced_or_not(folder: Path) -> None:
+    ball = folder / "SteppedBall.fmi3.fmu"
+    silent = folder / described(folder, ball.name, (' mightReturnEarlyFromDoStep="true"', ""))
+    assert bounces(silent) == bounces(ball)
+    importer = Importer([part("ball", ball)], macro_step=0.01)
+    importer.steps_in_c = False
+    importer.begin()
+    importer.components["ball"].instance.may_return_early = False  # the neglect: its early return is no end
+    with pytest.raises(ComponentError, match="since early return was not allowed"):
+        importer.advance(1.0)
+    importer.free()
+
+
+# ---- heeded: instances ----
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_a_process_has_one_instance_of_an_fmu_that_allows_no_more(folder: Path, fmi: str) -> None:
+    fmu = folder / f"Single.fmi{fmi[0]}.fmu"
+    for _ in range(2):  # one after the other
+        importer = Importer([part("a", fmu)], macro_step=0.1)
+        importer.begin()
+        importer.advance(1.0)
+        assert values(importer, "a", "y")[0] == pytest.approx(1.0)
+        importer.free()
+    with pytest.raises(
+        ComponentError, match=r"b: expected the only instance of Single.*canBeInstantiatedOnlyOncePerProcess"
+    ):
+        Importer([part("a", fmu), part("b", fmu)], macro_step=0.1)
+    text = '[component.a]\nfmu = "{0}"\n[component.b]\nfmu = "{0}"\n[record]\nrecorded_time = 1.0\n'
+    with pytest.raises(
+        SceneError, match=r"component.b.fmu: expected another FMU, got .*canBeInstantiatedOnlyOncePerProcess"
+    ):
+        parse_scene(text.format(fmu.name), str(folder / "scene.toml"))
+    flag = ' canBeInstantiatedOnlyOncePerProcess="true"'
+    lies = folder / described(folder, fmu.name, (flag, ""))
+    both = Importer([part("a", lies), part("b", lies)], macro_step=0.1)
+    both.begin()
+    both.advance(1.0)
+    assert values(both, "a", "y")[0] == pytest.approx(2.0)  # they add to one sum
+    both.free()
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_the_tool_of_an_fmu_is_named_where_it_makes_no_instance(
+    folder: Path, fmi: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fmu = described(
+        folder, f"Faulty.fmi{fmi[0]}.fmu", ("<CoSimulation ", '<CoSimulation needsExecutionTool="true" ')
+    )
+    monkeypatch.setenv("VIBROIMPACT_FAULTY_INSTANTIATE", "14")  # refuse
+    with pytest.raises(
+        ComponentError, match=r"a: fmi\dInstantiate.*needs Faulty on this machine \(needsExecutionTool\)"
+    ):
+        Importer([part("a", folder / fmu)])
+    with pytest.raises(ComponentError) as without:
+        Importer([part("a", folder / f"Faulty.fmi{fmi[0]}.fmu")])
+    assert "needsExecutionTool" not in str(without.value)
+
+
+def test_memory_functions_are_given_to_every_fmu(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mass = folder / "Mass.fmi2.fmu"
+    Instance2(unpack(mass), "m").free()
+    monkeypatch.setattr(instance2, "callback", lambda name: ctypes.c_void_p())
+    with pytest.raises(ComponentError, match="fmi2Instantiate made no instance"):
+        Instance2(unpack(mass), "m")
+
+
+def test_no_intermediate_update_is_asked_for(folder: Path) -> None:
+    offers = (
+        'providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true" '
+        'recommendedIntermediateInputSmoothness="1" hasEventMode'
+    )
+    samples = mass_samples(folder, described(folder, "Mass.fmi3.fmu", ("hasEventMode", offers)))
+    np.testing.assert_allclose(samples[:, 1:], exact(samples), atol=1e-12)
+    fmu = unpack(folder / "Mass.fmi3.fmu")
+    slave = FMU3Slave(
+        guid=fmu.token, unzipDirectory=str(fmu.folder), modelIdentifier="Mass", instanceName="m"
+    )
+    with pytest.raises(Exception, match="instantiate"):
+        slave.instantiate(intermediateUpdate=lambda *_: None)
+
+
+# ---- heeded: what is offered and never used ----
+
+#: The function that an importer calls where a flag offers it, by the flag.
+OFFERED = {
+    ("2.0", "canInterpolateInputs"): "SetRealInputDerivatives",
+    ("2.0", "maxOutputDerivativeOrder"): "GetRealOutputDerivatives",
+    ("2.0", "canSerializeFMUstate"): "SerializedFMUstateSize",
+    ("2.0", "providesDirectionalDerivative"): "GetDirectionalDerivative",
+    ("3.0", "maxOutputDerivativeOrder"): "GetOutputDerivatives",
+    ("3.0", "canSerializeFMUState"): "SerializedFMUStateSize",
+    ("3.0", "providesDirectionalDerivatives"): "GetDirectionalDerivative",
+    ("3.0", "providesAdjointDerivatives"): "GetAdjointDerivative",
+    ("3.0", "providesPerElementDependencies"): "GetVariableDependencies",
+    ("3.0", "providesEvaluateDiscreteStates"): "EvaluateDiscreteStates",
+}
+
+
+@pytest.mark.parametrize(("fmi", "flag"), OFFERED)
+def test_what_is_offered_and_not_needed_is_not_called(folder: Path, fmi: str, flag: str) -> None:
+    fmu = f"StatelessMass.fmi{fmi[0]}.fmu"
+    text = (folder_text := unpack(folder / fmu).folder / "modelDescription.xml").read_text(encoding="utf-8")
+    assert folder_text.exists()
+    value = "1" if flag.startswith("max") else "true"
+    old = f' {flag}="false"' if f' {flag}="false"' in text else " modelIdentifier"
+    new = f' {flag}="{value}"' + ("" if old.endswith('"') else old)
+    samples = mass_samples(folder, described(folder, fmu, (old, new)))
+    np.testing.assert_array_equal(samples, mass_samples(folder, fmu))
+    instance = (Instance2 if fmi == "2.0" else Instance3)(unpack(folder / fmu), "m")
+    size = ctypes.c_size_t()
+    answer = instance._function(OFFERED[fmi, flag])(instance.pointer, None, ctypes.byref(size))
+    assert answer == 3  # an importer that calls it is told so
+    instance.free()
+
+
+# ---- refused ----
+
+
+def test_a_step_that_goes_on_by_itself_is_refused_by_the_name_of_its_flag(folder: Path) -> None:
+    flag = ("<CoSimulation ", '<CoSimulation canRunAsynchronuously="true" ')
+    fmu = folder / described(folder, "Faulty.fmi2.fmu", flag)
+    importer = Importer([part("a", fmu, fault="pending", fault_time=0.35)], macro_step=0.1)
+    importer.begin()
+    with pytest.raises(ComponentError, match=r"fmi2DoStep returned pending, .*\(canRunAsynchronuously\)"):
+        importer.advance(1.0)
+    importer.free()
+
+
+CONSTANT = 'intervalVariability="constant" intervalDecimal="0.2"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        (CONSTANT, 'intervalVariability="triggered"', "triggered input clock tick"),
+        ('intervalVariability="fixed"', 'intervalVariability="tunable"', "tunable input clock late"),
+        ('intervalVariability="fixed"', 'intervalVariability="countdown"', "countdown input clock late"),
+        ('intervalVariability="fixed"', 'intervalVariability="changing"', "changing input clock late"),
+        ('intervalDecimal="0.2"', 'intervalDecimal="0"', "input clock tick without an interval > 0"),
+        ('intervalDecimal="0.2"', 'intervalDecimal="NaN"', "input clock tick without an interval > 0"),
+        ('intervalDecimal="0.2"', "", "input clock tick without an interval > 0"),
+        ('intervalDecimal="0.2"', 'intervalDecimal="1" shiftDecimal="-1"', "input clock tick without an interval > 0"),
+        ('hasEventMode="true"', 'hasEventMode="false"', "input clock tick, late and hasEventMode = false"),
+    ],
+)  # fmt: skip
+def test_other_clocks_are_refused_by_their_names(folder: Path, old: str, new: str, named: str) -> None:
+    fmu = described(folder, "Clocked.fmi3.fmu", (old, new))
+    text = f'[scene]\nunits = "SI"\n[component.c]\nfmu = "{fmu}"\n[record]\nrecorded_time = 1.0\n'
+    with pytest.raises(
+        SceneError, match=rf"component.c.fmu: expected an FMU whose clocks are .*got the {named}"
+    ):
+        parse_scene(text, str(folder / "scene.toml"))
+    with pytest.raises(ComponentError, match=named):
+        Component(ComponentSpec("c", folder / fmu))
+
+
+# ---- heeded: clocks ----
+
+
+CLOCKED = """
+[scene]
+units = "SI"
+[component.y]
+fmu = "Faulty.fmi{major}.fmu"
+[component.c]
+fmu = "{fmu}"
+parameters = {{ interval = 0.25, shift = 0.125 }}
+[[connection]]
+from = "y.y"
+to = "c.u"
+[record]
+recorded_time = 1.0
+rate = 1000
+variables = ["c.y", "c.ticks", "c.late_ticks", "c.sum"]
+[execution]
+macro_step = {macro_step}
+exchange = "{exchange}"
+"""
+
+
+@pytest.mark.parametrize("exchange", ["gauss_seidel", "jacobi", "iterated"])
+@pytest.mark.parametrize(("macro_step", "major"), [(0.03, "3"), (0.2, "2"), (1.0, "3")])
+def test_input_clocks_tick_at_their_instants(
+    folder: Path, macro_step: float, major: str, exchange: str
+) -> None:
+    text = CLOCKED.format(fmu="Clocked.fmi3.fmu", macro_step=macro_step, major=major, exchange=exchange)
+    samples = samples_of(run(text, folder))
+    time, y, ticks, late, total = samples.T
+    # a sample at a tick is that of before it, but for the first
+    count = np.where(time == 0.0, 1.0, np.ceil(np.round(time / 0.2, 9)))
+    late_count = np.ceil(np.round((time - 0.125) / 0.25, 9)).clip(0.0)
+    np.testing.assert_array_equal(ticks, count)
+    np.testing.assert_array_equal(late, late_count)
+    np.testing.assert_allclose(y, 10.0 * count + 0.2 * (count - 1.0), rtol=0, atol=1e-12)
+    exact_sum = sum((time - at).clip(0.0) for at in (*np.arange(6) * 0.2, *(0.125 + 0.25 * np.arange(4))))
+    np.testing.assert_allclose(total, exact_sum, rtol=0, atol=1e-9)
+
+
+def test_a_clock_that_nobody_ticks_counts_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = CLOCKED.format(fmu="Clocked.fmi3.fmu", macro_step=0.1, major="3", exchange="jacobi")
+    monkeypatch.setattr("vibroimpact.orchestrator.importer.ticks.Ticks.are_due", lambda *_: False)
+    monkeypatch.setattr("vibroimpact.orchestrator.importer.ticks.Ticks._find_next", lambda _: None)
+    samples = samples_of(run(text, folder))
+    assert not samples[:, 2:].any()
+
+
+def test_the_interval_of_a_clock_may_be_a_fraction(folder: Path) -> None:
+    # the functions for fractions that it offers answer error
+    fraction = 'supportsFraction="true" canBeDeactivated="true" resolution="3" intervalCounter="1"'
+    fmu = described(folder, "Clocked.fmi3.fmu", ('intervalDecimal="0.2"', fraction))
+    ticks = samples_of(run(CLOCKED.format(fmu=fmu, macro_step=0.1, major="3", exchange="jacobi"), folder))[
+        :, 2
+    ]
+    assert ticks[-1] == 3.0  # at 0, 1/3, 2/3; the one at 1 comes after the last sample
+    assert int(np.argmax(ticks == 2.0)) == 334
+
+
+def test_a_fixed_interval_that_the_fmu_does_not_know_is_an_error_with_the_clock(folder: Path) -> None:
+    for parameters in ({"interval": 0.0}, {"shift": -1.0}):
+        importer = Importer([part("c", folder / "Clocked.fmi3.fmu", **parameters)], macro_step=0.1)
+        with pytest.raises(
+            ComponentError, match="c: clock late: expected an interval > 0 and a shift >= 0, got"
+        ):
+            importer.begin()
+        importer.free()
+
+
+def test_clocked_components_feed_each_other_at_one_tick(folder: Path) -> None:
+    fmu = folder / "Clocked.fmi3.fmu"
+    importer = Importer([part("b", fmu), part("a", fmu)], [link("a.y", "b.u")], macro_step=0.07)
+    outputs = [importer.components[name].group("Float64", ["y"]) for name in "ab"]
+    importer.begin()
+    importer.advance(0.5)
+    assert [group.get()[0] for group in outputs] == [30.0, 60.0]  # of the tick at .4: 10 ticks, and a.y
+    with pytest.raises(ComponentError, match=r"a: fmi3GetFloat64 returned error"):
+        values(importer, "a", "y")  # nobody has kept what was never asked for
+    importer.free()
+
+
+Punished = Callable[..., None]
+PUNISHED: dict[Flag, Punished] = {}
+
+
+def _punished_by(test: Punished, *names: str) -> None:
+    """Note which test has the FMU that punishes the neglect of heeded flags."""
+    for flag in FLAGS:
+        if flag.name in names and flag.treatment is Treatment.heeded:
+            PUNISHED[flag] = test
+
+
+_punished_by(test_the_tool_of_an_fmu_is_named_where_it_makes_no_instance, "needsExecutionTool")
+_punished_by(
+    test_a_process_has_one_instance_of_an_fmu_that_allows_no_more, "canBeInstantiatedOnlyOncePerProcess"
+)
+_punished_by(test_memory_functions_are_given_to_every_fmu, "canNotUseMemoryManagementFunctions")
+_punished_by(
+    test_a_step_of_another_size_is_wrong_without_a_word_of_the_fmu, "canHandleVariableCommunicationStepSize"
+)
+_punished_by(test_a_solver_of_fixed_steps_may_end_a_step_short_of_its_end, "fixedInternalStepSize")
+_punished_by(test_an_fmu_without_states_is_asked_for_none, "canGetAndSetFMUstate", "canGetAndSetFMUState")
+_punished_by(test_event_mode_is_entered_where_it_is_declared_alone, "hasEventMode")
+_punished_by(test_an_early_return_counts_whether_it_was_announced_or_not, "mightReturnEarlyFromDoStep")
+_punished_by(test_what_is_offered_and_not_needed_is_not_called, *(flag for _, flag in OFFERED))
+_punished_by(
+    test_no_intermediate_update_is_asked_for,
+    "providesIntermediateUpdate",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "recommendedIntermediateInputSmoothness",
+)
+_punished_by(test_a_clock_that_nobody_ticks_counts_nothing, "intervalVariability", "canBeDeactivated")
+_punished_by(test_the_interval_of_a_clock_may_be_a_fraction, "supportsFraction")
