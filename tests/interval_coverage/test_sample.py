@@ -13,7 +13,7 @@ from interval_coverage._table import FEWEST, HELD, HELD_IN_REGION, Share, shares
 
 SEED = 1
 PLAIN = (0, 2, 14, 16, 20, 24, 30, 34)
-SPOILED = {11: "second mode", 35: "dry friction", 47: "speed-dependent restitution", 71: "second stop"}
+SPOILED = {11: "second mode", 35: "dry friction", 95: "speed-dependent restitution", 71: "second stop"}
 
 
 @cache
@@ -39,11 +39,11 @@ def test_intervals_of_plain_records_hold_the_truth():
 
 
 def test_a_record_is_the_same_for_the_same_case_and_seed():
-    one, other = record(20, SEED), record(20, SEED)
+    one, other = record(24, SEED), record(24, SEED)
     assert one.truth == other.truth
     assert (one.values == other.values).all()
-    assert record(20, SEED + 1).truth != one.truth
-    again = record(20, SEED, 1)
+    assert record(24, SEED + 1).truth != one.truth
+    again = record(24, SEED, 1)
     assert again.truth == one.truth
     assert np.std(again.values - one.values) == pytest.approx(
         np.sqrt(2.0) * one.noise * np.max(np.abs(one.values - one.truth["offset"])), rel=0.1
