@@ -52,7 +52,7 @@ bench: $(VENV)/bench.stamp $(VENV)/fmus.stamp ## run the benchmarks; each leaves
 peers: $(VENV)/peers.stamp $(VENV)/fmus.stamp ## measure other people's solvers beside ours; writes the end of docs/accuracy.md
 	PYTHONPATH=tests:tests/benchmarks $(BIN)/python -m peers
 
-coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 300 records whether the intervals of estimates hold the truth; goes on where it ended; SEED= RECORDS=
+coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 480 records whether the intervals of estimates hold the truth; goes on where it ended; SEED= RECORDS=
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m interval_coverage
 
 exchange: $(VENV)/exchange.stamp $(VENV)/fmus.stamp ## try the exports in every tool that is here, compile them for other machines

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters, central_differences
-from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.analysis.estimation.segments import DOUBTFUL, FEWEST_IN_FLIGHT, Flight, Signal
 from vibroimpact.fmus.core import motion
 from vibroimpact.fmus.errors import EstimationError
 
@@ -279,14 +279,52 @@ def flights_to_level(
     level : float
         From the offset.
     """
+    found = []
+    for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
+        times = signal.time[one.flight.index]
+        found.append(replace(one.flight, start=min(start, float(times[0])), end=max(end, float(times[-1]))))
+    return found
+
+
+def _instants_at(
+    fitted: Sequence[FittedFlight], level: float, p: Parameters
+) -> tuple[list[float], list[float]]:
+    """Return when the exact flow of flights leaves a level and meets it again, s."""
     starts, ends = (np.array([getattr(one.flight, name) for one in fitted]) for name in ("start", "end"))
     reach = _REACH * (ends - starts)
     first = _shifts_to(with_acceleration(np.array([one.state for one in fitted]), starts, p), level, reach)
     last = _shifts_to(with_acceleration(np.array([one.end_state for one in fitted]), ends, p), level, reach)
+    return (starts + first).tolist(), (ends + last).tolist()
+
+
+def cut_at_level(
+    signal: Signal, fitted: Sequence[FittedFlight], level: float, p: Parameters, noise: float
+) -> list[Flight]:
+    """Return the flights with the samples between the instants at which their exact flow meets a level.
+
+    The instant of a kink shares its noise with the samples beside it. Were these chosen by it, their noise would not be
+    0 on average, and at few samples in a flight the estimates were off by more than they state.
+
+    Parameters
+    ----------
+    level : float
+        From the offset.
+    noise : float
+        Standard deviation of the samples.
+    """
     found = []
-    for one, start, end in zip(fitted, (starts + first).tolist(), (ends + last).tolist(), strict=True):
-        times = signal.time[one.flight.index]
-        found.append(replace(one.flight, start=min(start, float(times[0])), end=max(end, float(times[-1]))))
+    for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
+        weights = one.gain[0], one.to_end[0, :2] @ one.gain
+        doubts = [
+            DOUBTFUL * noise * float(np.linalg.norm(row)) / max(abs(float(speed)), 1e-300)
+            for row, speed in zip(weights, (one.state[1], one.end_state[1]), strict=True)
+        ]
+        first = int(np.searchsorted(signal.time, start + doubts[0], side="right"))
+        last = int(np.searchsorted(signal.time, end - doubts[1], side="left"))
+        index = np.arange(first, last)
+        index = index[signal.good[index]]
+        enough = len(index) >= FEWEST_IN_FLIGHT
+        found.append(replace(one.flight, start=start, end=end, index=index) if enough else one.flight)
     return found
 
 

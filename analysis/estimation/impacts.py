@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -31,6 +32,7 @@ Estimates = dict[str, MethodEstimate]
 
 # Standard errors from which a damping ratio is told from the restitution and, with more unknowns, from the force.
 _CLEAR = {"energy_joint": 0.5, "energy_amplitude": 3.0}
+_RESTITUTIONS = ("restitution", "energy_loss_factor")
 # Standard error of the restitution, relative to what noise and samples allow, below which the interval has no width.
 _NO_WIDTH = 1e-3
 # Errors of a method's numbers on motion far from its model; one method's failure leaves the others.
@@ -268,8 +270,12 @@ def _energy_values(method: str, record: Prepared, resampled: Resampled, confiden
 
 
 def _as_measured(values: Estimates, sign: float) -> Estimates:
-    """Return estimates in the coordinate of the channel: a lower stop was mirrored."""
+    """Return estimates in the coordinate of the channel, restitutions from 0 on: a lower stop was mirrored."""
     found = dict(values)
+    for name in _RESTITUTIONS:
+        if name in found:
+            one = found[name]
+            found[name] = replace(one, value=max(one.value, 0.0), low=max(one.low, 0.0))
     for name in ("stop_position", "offset"):
         if name in found and sign < 0.0:
             one = found[name]

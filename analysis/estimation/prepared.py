@@ -9,7 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.analysis.estimation.estimates import FittedMotion
-from vibroimpact.analysis.estimation.flight_fit import FlightFit, FlightSearch, fit_flights, search_flights
+from vibroimpact.analysis.estimation.flight_fit import (
+    FlightFit,
+    FlightSearch,
+    cut_at_level,
+    fit_flights,
+    search_flights,
+)
 from vibroimpact.analysis.estimation.physics import Floats, Forcing, Known, Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal, segment_channel
 from vibroimpact.analysis.estimation.trajectory import Trajectory, follow
@@ -128,6 +134,9 @@ def _prepared(
         flights = [flights[k] for k in followed]
         start, _ = weak_form(weighted_flights(signal, flights, fastest), search.parameters, free)
         search, parameters, fit = _searched(signal, flights, start, free, stop)
+    level = (fit.reading.stop_position if stop is None else stop) - parameters.offset
+    flights = cut_at_level(signal, fit.fitted, level, parameters, fit.noise)
+    search, parameters, fit = _searched(signal, flights, search.parameters, free, stop)
     parameters = replace(
         parameters,
         restitution=min(max(fit.reading.restitution, 0.0), 1.0),

@@ -34,8 +34,9 @@ _FEWEST_IMPACTS = 5
 _FEWEST_SAMPLES = 12
 # Standard errors of both together from which two methods contradict each other.
 _APART = 3.0
-# Relative standard error of a natural frequency from which it is hardly determined.
-_DETERMINED = 0.1
+# Relative standard error of a natural frequency, above which stiffness, force and offset fit alike along a valley. Of
+# the intervals in 300 records 72 to 82 % held the truth between .04 and .07, and 94 % below .03.
+_DETERMINED = 0.04
 
 Values = Mapping[str, Mapping[str, MethodEstimate]]
 
@@ -140,6 +141,8 @@ def _of_stops(record: Prepared) -> Iterator[Doubt]:
     cut = record.segmentation
     if cut.opposite >= max(_FEWEST_OPPOSITE, _PART_OPPOSITE * len(cut.impacts)):
         yield Doubt(f"{cut.opposite} impacts turn the motion the other way: there is a second stop")
+    if cut.passed:
+        yield Doubt("the motion goes beyond the level of its impacts: they are not those of one stop")
     if cut.stray > _PART_STRAY * (cut.stray + len(cut.impacts)):
         yield Doubt(
             f"{cut.stray} of {cut.stray + len(cut.impacts)} jumps of the velocity are not where the others are: "
@@ -250,12 +253,14 @@ def _of_precision(record: Prepared, values: Values) -> Iterator[Doubt]:
         elif natural is not None and natural.standard_error > _DETERMINED * natural.value:
             yield Doubt(
                 f"the motion hardly determines the natural frequency ({natural.value:.3g} +- "
-                f"{natural.standard_error:.1g} rad/s): give it",
+                f"{natural.standard_error:.1g} rad/s), stiffness, force and offset fit alike: give it",
                 (method,),
             )
         restitution = found.get("restitution")
-        if restitution is not None and not 0.0 <= restitution.value <= 1.0:
+        if restitution is not None and restitution.value > 1.0:
             yield Doubt(f"a restitution of {restitution.value:.3g} is not between 0 and 1", (method,))
+        if restitution is not None and restitution.value < 0.0:
+            yield Doubt("the restitution that fits best is below 0, and given as 0", (method,))
         damping = found.get("damping_ratio")
         if damping is not None and damping.value < 0.0:
             yield Doubt(f"a damping ratio of {damping.value:.2g} is below 0", (method,))

@@ -26,7 +26,7 @@ from vibroimpact.fmus.errors import EstimationError
 _JUMPS_BEYOND = 5.0
 # ... and from this multiple of the jump that smooth motion of the largest size and the fastest rate seems to have.
 _BIAS_BEYOND = 1.5
-_FEWEST_IN_FLIGHT = 10
+FEWEST_IN_FLIGHT = 10
 # Relative deviation of a sampling step from the median beyond which it is a gap or a repeated sample, without a kink.
 _UNEVEN = 0.5
 _REFINEMENTS = 4
@@ -47,8 +47,12 @@ _CLEAR_OF = 1.1
 _PART_OF_LARGEST = 0.1
 # A known stop is refused if it is this part of the motion's size off the impacts; checked from this many impacts on.
 _STOP_OF_SIZE, _FEWEST_TO_CHECK = 0.1, 5
+# Motion goes beyond a level if more than this part of its samples is further than this part of its size on.
+_PART_BEYOND, _BEYOND_OF_SIZE = 0.05, 0.1
+# Fewest jumps of the velocity without a kink from which their own scatter is taken as their error.
+_FEWEST_FREE = 50
 # Samples within this many standard errors of the instant of an impact belong to no flight.
-_DOUBTFUL = 2.5
+DOUBTFUL = 2.5
 _OTHER_UNITS = {"m s-1": "a velocity", "m s-2": "an acceleration", "N": "a force"}
 
 
@@ -168,6 +172,11 @@ class Segmentation:
         weight = np.array([(impact.before - impact.after) ** 2 for impact in self.impacts])
         return float(np.average([impact.level for impact in self.impacts], weights=weight))
 
+    @property
+    def passed(self) -> bool:
+        """Whether the motion goes beyond the level of the kinks: it is that of no stop."""
+        return bool(self.impacts) and _goes_beyond(self.signal, self.stop_position)
+
 
 def segment_channel(channel: Channel, fastest: float, known: Known, window: float | None) -> Segmentation:
     """Cut a channel at its impacts; see `segment`.
@@ -235,12 +244,20 @@ def segment(
     else:
         counts = [max(_FEWEST_IN_WINDOW, round(window / interval))]
     found: Segmentation | None = None
+    misplaced: EstimationError | None = None
     for count in counts:
-        trial = _cut(signal, fastest, count, side, stop_position)
-        if found is None or len(trial.impacts) > _MORE * len(found.impacts):
+        try:
+            trial = _possible_cut(signal, fastest, count, side, stop_position)
+        except EstimationError as problem:
+            # the kinks of a window that is too long are not where the impacts are
+            misplaced = misplaced or problem
+            continue
+        if found is None or _better(trial, found):
             found = trial
-        if _uncrowded(trial, count):
+        if _uncrowded(trial, count) and not trial.passed:
             break
+    if misplaced is not None and (found is None or len(found.impacts) < _FEWEST_TO_CHECK):
+        raise misplaced
     if found is None or len(found.impacts) < 2:
         raise EstimationError(
             f"segmentation: expected at least two impacts with a jump of the velocity above the noise "
@@ -259,19 +276,62 @@ def _counts(most: float) -> list[int]:
     return counts
 
 
+def _better(trial: Segmentation, found: Segmentation) -> bool:
+    """Tell whether a shorter window shows more impacts, or a stop where the longer one shows none."""
+    if trial.passed != found.passed:
+        return _is_stopped(trial)
+    return len(trial.impacts) > _MORE * len(found.impacts)
+
+
+def _goes_beyond(signal: Signal, level: float) -> bool:
+    """Tell whether more samples are above a level than a stop there leaves, noise and its yielding counted."""
+    limit = level + max(_BEYOND_OF_SIZE * 0.5 * signal.range, _JUMPS_BEYOND * signal.noise)
+    return bool(np.mean(signal.values[signal.good] > limit) > _PART_BEYOND)
+
+
 def _uncrowded(cut: Segmentation, count: int) -> bool:
     """Tell whether no impact has another so near that a shorter window would show more."""
     apart = np.diff([impact.time for impact in cut.impacts])
     return bool(len(apart) and not cut.stray and np.min(apart) > _APART * count * cut.signal.interval)
 
 
-def _cut(
+def _possible_cut(
     raw: Signal, fastest: float, count: int, side: str | None, stop_position: float | None
 ) -> Segmentation:
-    """Return a signal cut at the impacts that windows of `count` samples on each side show."""
+    """Return a signal cut at the impacts of windows of `count` samples, of the side that the motion does not pass.
+
+    In a window that is too long for the motion, smooth motion turns as an impact on the other side would.
+    """
+    sign = _side_sign(_jumps_and_least(raw, fastest, count)[0], side)
+    cuts: list[Segmentation | EstimationError] = []
+    for one in (sign, -sign) if side is None else (sign,):
+        try:
+            found = _cut(raw, fastest, count, one, stop_position)
+        except EstimationError as problem:
+            cuts.append(problem)
+            continue
+        if _is_stopped(found):
+            return found
+        cuts.append(found)
+    if isinstance(cuts[0], EstimationError):
+        raise cuts[0]
+    return cuts[0]
+
+
+def _is_stopped(cut: Segmentation) -> bool:
+    """Tell whether a cut has impacts, and no motion beyond them."""
+    return len(cut.impacts) >= 2 and not cut.passed
+
+
+def _mirrored(raw: Signal, sign: float) -> Signal:
+    """Return a signal whose stop is an upper one: a lower one, of sign -1, is mirrored."""
+    return replace(raw, values=sign * raw.values, sign=sign)
+
+
+def _cut(raw: Signal, fastest: float, count: int, sign: float, stop_position: float | None) -> Segmentation:
+    """Return a signal cut at the impacts on one side that windows of `count` samples on each side show."""
     jump, least = _jumps_and_least(raw, fastest, count)
-    sign = _side_sign(jump, side)
-    signal = replace(raw, values=sign * raw.values, sign=sign)
+    signal = _mirrored(raw, sign)
     places = _kinks(-sign * jump, least, count)
     stop = None if stop_position is None else sign * stop_position
     located = _located(signal, places, count, stop)
@@ -283,9 +343,18 @@ def _cut(
 
 
 def _opposite(signal: Signal, fastest: float, count: int) -> int:
-    """Return how many kinks the other way windows of `count` samples show, away from those of the stop."""
+    """Return how many kinks the other way windows of `count` samples show, away from those of the stop.
+
+    Noise that is not white moves slopes by more than its differences from sample to sample show. The jumps away from
+    kinks show by how much.
+    """
     jump, least = _jumps_and_least(signal, fastest, count)
     ours = _kinks(-jump, least, count)
+    away = np.isfinite(jump)
+    for place in ours:
+        away[max(0, place - count) : place + count + 1] = False
+    if np.count_nonzero(away) >= _FEWEST_FREE:
+        least = max(least, _JUMPS_BEYOND * robust_sigma(jump[away] - np.median(jump[away])))
     largest = float(np.max(-jump[ours])) if ours else 0.0
     others = _kinks(jump, max(least, _PART_OF_LARGEST * largest), count)
     return sum(all(abs(place - one) > _CLEAR_OF * count for one in ours) for place in others)
@@ -474,12 +543,12 @@ def _flights(signal: Signal, impacts: list[Impact]) -> tuple[Flight, ...]:
     for k in range(len(impacts) - 1):
         start, end = impacts[k].time, impacts[k + 1].time
         # a sample so near an impact may belong to the other side of it
-        doubt = [_DOUBTFUL * impact.time_error for impact in impacts[k : k + 2]]
+        doubt = [DOUBTFUL * impact.time_error for impact in impacts[k : k + 2]]
         first = int(np.searchsorted(signal.time, start + doubt[0], side="right"))
         last = int(np.searchsorted(signal.time, end - doubt[1], side="left"))
         index = np.arange(first, last)
         index = index[signal.good[index]]
         # a gap leaves a flight that cannot be followed
-        usable = len(index) >= max(_FEWEST_IN_FLIGHT, 0.8 * (end - start - sum(doubt)) / signal.interval - 2)
+        usable = len(index) >= max(FEWEST_IN_FLIGHT, 0.8 * (end - start - sum(doubt)) / signal.interval - 2)
         flights.append(Flight(start, end, index, k, usable))
     return tuple(flights)

@@ -1,4 +1,4 @@
-"""`make coverage`: 300 records, side by side; resumable; exit code 1 where a target is missed. SEED= RECORDS="""
+"""`make coverage`: 480 records, side by side; resumable; exit code 1 where a target is missed. SEED= RECORDS="""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from support.places import ROOT
 from interval_coverage._asked import asked
 from interval_coverage._table import Line, again, shares, table_of, thin
 
-SEED, RECORDS = 7, 300
+SEED, RECORDS = 7, 480
 DRAWS = 7
 """Further draws of the noise of records whose cell of the table has few intervals."""
 Place = tuple[int, int]

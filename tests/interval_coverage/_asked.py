@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from vibroimpact.fmus.errors import EstimationError
 METHODS = ("energy_known_damping", "energy_joint", "energy_amplitude", "weak_form", "trajectory")
 
 
-def estimates_of(one: Record) -> ImpactEstimates:
+def estimates_of(one: Record, methods: Sequence[str] = METHODS) -> ImpactEstimates:
     """Return the estimates from a record with what is known of it."""
     axis = TimeAxis(one.time, float(one.time[1] - one.time[0]))
     channel = Channel("tip", one.values, "m", axis, np.zeros(len(one.time), np.uint8))
@@ -25,7 +26,7 @@ def estimates_of(one: Record) -> ImpactEstimates:
         stop_position=one.truth["stop_position"] if with_stop else None,
         offset=one.truth["offset"] if with_damping else None,
     )
-    return estimate_impacts(channel, Forcing(one.truth["angular_frequency"]), known, methods=METHODS)
+    return estimate_impacts(channel, Forcing(one.truth["angular_frequency"]), known, methods=methods)
 
 
 def asked(place: tuple[int, int], seed: int) -> dict[str, Any]:
@@ -38,6 +39,7 @@ def asked(place: tuple[int, int], seed: int) -> dict[str, Any]:
     line: dict[str, Any] = {
         "case": case,
         "draw": draw,
+        "region": one.region,
         "spoil": one.spoil,
         "known": one.known,
         "noise": one.noise,

@@ -15,7 +15,11 @@ SPOILS = ("second mode", "second stop", "dry friction", "speed-dependent restitu
 SPOILED_EVERY = 12
 KNOWN = ("frequency", "stop", "damping")
 """What is known, each level with those before it: the forcing frequency, the stop, damping and offset."""
+REGIONS = ("whole spread", "50 samples a period", "5 % noise", "forcing below .8 of resonance")
+"""Parts of the spread that are drawn equally often: three of them hard."""
 PER_PERIOD = (50, 100, 200, 500, 1000, 2000)
+_NOISE, _RATIO = (1e-3, 5e-2), (0.7, 4.0)
+_HARD_NOISE, _HARD_RATIO = 5e-2, (0.5, 0.8)
 _FEWEST_IMPACTS = 9
 _SETTLED = 30.0
 # A second stop is there when it is hit so often, a restitution depends on the speed when it varies by so much.
@@ -32,8 +36,8 @@ class Record:
     time, values : ndarray, shape (sample,)
     truth : dict
         By the names of `vibroimpact.analysis.estimation.QUANTITIES`.
-    known, spoil : str
-        Of `KNOWN`, and of `SPOILS` or empty.
+    region, known, spoil : str
+        Of `REGIONS`, of `KNOWN`, and of `SPOILS` or empty.
     noise : float
         Part of the peak.
     per_period, impacts : int
@@ -44,6 +48,7 @@ class Record:
     time: np.ndarray
     values: np.ndarray
     truth: dict[str, float]
+    region: str
     known: str
     spoil: str
     noise: float
@@ -55,20 +60,28 @@ class Record:
 def record(case: int, seed: int, draw: int = 0) -> Record:
     """Return one record; the same for the same case and seed, and of one motion for all draws of its noise."""
     rng = np.random.default_rng([seed, case])
-    spoil = SPOILS[(case // SPOILED_EVERY) % len(SPOILS)] if case % SPOILED_EVERY == SPOILED_EVERY - 1 else ""
+    block, place = divmod(case, SPOILED_EVERY)
+    spoil = SPOILS[block % len(SPOILS)] if place == SPOILED_EVERY - 1 else ""
+    # each block has all pairs of region and known; the pair of its spoiled record changes from block to block
+    region = REGIONS[(place // len(KNOWN) + block // len(SPOILS)) % len(REGIONS)]
+    known = KNOWN[(case + block) % len(KNOWN)]
     while True:
         noise = np.random.default_rng([seed, case, draw]) if draw else rng
-        found = _drawn(rng, KNOWN[(case + case // SPOILED_EVERY) % len(KNOWN)], spoil, noise)
+        found = _drawn(rng, region, known, spoil, noise)
         if found is not None:
             return found
 
 
-def _drawn(rng: np.random.Generator, known: str, spoil: str, noises: np.random.Generator) -> Record | None:
+def _drawn(
+    rng: np.random.Generator, region: str, known: str, spoil: str, noises: np.random.Generator
+) -> Record | None:
     """Return a record, None where the motion hardly hits the stop."""
     natural, deflection = _log(rng, 10.0, 1000.0), _log(rng, 0.1, 10.0)
-    ratio, damping = _log(rng, 0.7, 4.0), _log(rng, 0.02, 0.15)
+    ratio = _log(rng, *(_HARD_RATIO if region == REGIONS[3] else _RATIO))
+    damping = _log(rng, 0.02, 0.15)
     position, restitution = rng.uniform(-0.2, 1.0) * deflection, rng.uniform(0.6, 0.9)
-    frequency, per_period = ratio * natural, int(rng.choice(PER_PERIOD))
+    frequency = ratio * natural
+    per_period = int(rng.choice(PER_PERIOD[:1] if region == REGIONS[1] else PER_PERIOD))
     body = _body(natural, damping, deflection, frequency, position, restitution, spoil, rng)
     time = np.arange(round(rng.uniform(15.0, 44.0) * per_period)) * 2.0 * math.pi / frequency / per_period
     begin = 2.0 * math.pi / frequency * (_SETTLED + rng.uniform())
@@ -79,7 +92,7 @@ def _drawn(rng: np.random.Generator, known: str, spoil: str, noises: np.random.G
     if len(instants) < _FEWEST_IMPACTS or not _shows(spoil, body, impacts, begin):
         return None
     sign, offset = rng.choice([-1.0, 1.0]), rng.uniform(-2.0, 2.0) * deflection
-    noise = _log(rng, 1e-3, 5e-2)
+    noise = _HARD_NOISE if region == REGIONS[2] else _log(rng, *_NOISE)
     peak = float(np.max(np.abs(motion[1:])))
     values = sign * motion[1:] + offset + noise * peak * noises.standard_normal(len(time))
     turned = body.phase + frequency * begin + (0.0 if sign > 0.0 else math.pi)
@@ -97,6 +110,7 @@ def _drawn(rng: np.random.Generator, known: str, spoil: str, noises: np.random.G
         time,
         values,
         truth | {"angular_frequency": frequency},
+        region,
         known,
         spoil,
         noise,

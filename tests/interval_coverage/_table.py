@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rich.table import Table
-from scipy.stats import binom
+from scipy.stats import binom, norm
 
 from interval_coverage._asked import METHODS
+from interval_coverage._records import REGIONS
 
-HELD = (0.92, 0.98)
+HELD, HELD_IN_REGION = (0.92, 0.98), (0.93, 0.97)
 ANSWERED, ANSWERED_GOOD, FLAGGED = 0.70, 0.90, 0.90
+SOMETHING_SURE = 0.60
 GOOD_NOISE, GOOD_FLIGHT = 0.02, 12
 # A share misses its target when this chance, or less, would bring it so far off were the target just met.
 CHANCE = 0.01
@@ -24,19 +27,23 @@ Line = dict[str, Any]
 
 @dataclass(frozen=True)
 class Share:
-    """A share with the target that it is held to."""
+    """A share with the target that it is held to; its standard error where several intervals are of one record."""
 
     what: str
     hits: int
     total: int
     low: float
     high: float = 1.0
+    error: float | None = None
 
     @property
     def missed(self) -> bool:
         """Tell whether chance does not explain how far the share is off its target."""
         if not self.total:
             return False
+        if self.error is not None:
+            off = max(self.low - self.hits / self.total, self.hits / self.total - self.high)
+            return bool(off > norm.isf(CHANCE) * self.error)
         few = binom.cdf(self.hits, self.total, self.low) < CHANCE
         many = self.high < 1.0 and binom.sf(self.hits - 1, self.total, self.high) < CHANCE
         return bool(few or many)
@@ -47,7 +54,7 @@ def shares(lines: Sequence[Line]) -> list[Share]:
     clean = [line for line in lines if not line["spoil"]]
     spoiled = [line for line in lines if line["spoil"]]
     good = [line for line in clean if line["noise"] <= GOOD_NOISE and line["flight_samples"] >= GOOD_FLIGHT]
-    found = list(_held(clean))
+    found = [*_held(clean), *_by_region(clean)]
     for method in METHODS:
         asked = _can_answer(method)
         for words, some, target in (("clean", clean, ANSWERED), ("good", good, ANSWERED_GOOD)):
@@ -69,6 +76,29 @@ def _held(clean: Iterable[Line]) -> Iterable[Share]:
     for method, name in sorted(counts, key=lambda key: (METHODS.index(key[0]), key[1])):
         held = counts[method, name]
         yield Share(f"{method}: {name}", sum(held), len(held), *HELD)
+
+
+def _by_region(clean: Sequence[Line]) -> Iterable[Share]:
+    """Yield the shares of intervals that hold the truth, by region, and how many records have a method that is sure.
+
+    The intervals of one record miss together: the standard error is that of sums over records.
+    """
+    for region in REGIONS:
+        lines = [line for line in clean if line["region"] == region]
+        held = [
+            [
+                low <= truth <= high
+                for values in line["sure"].values()
+                for _, _, low, high, truth in values.values()
+            ]
+            for line in lines
+        ]
+        hits, total = sum(map(sum, held)), sum(map(len, held))
+        if total:
+            square = sum((sum(one) - hits / total * len(one)) ** 2 for one in held)
+            yield Share(f"{region}: intervals", hits, total, *HELD_IN_REGION, math.sqrt(square) / total)
+        sure = sum(bool(line["sure"]) for line in lines)
+        yield Share(f"{region}: records of which something is sure", sure, len(lines), SOMETHING_SURE)
 
 
 def thin(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
@@ -109,6 +139,7 @@ def table_of(found: Sequence[Share]) -> Table:
     table = Table("what", "share", "of", "target", "")
     for one in found:
         share = f"{100.0 * one.hits / one.total:.1f} %" if one.total else "-"
+        share += f" +- {100.0 * one.error:.1f}" if one.error is not None else ""
         target = f"{100.0 * one.low:g} to {100.0 * one.high:g} %"
         table.add_row(one.what, share, f"{one.hits}/{one.total}", target, "MISSED" if one.missed else "")
     return table

@@ -1,17 +1,19 @@
 """Twelve short records of `make coverage`, eight plain ones and one of each kind that is spoiled."""
 
+import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from interval_coverage._asked import asked
-from interval_coverage._records import SPOILS, record
-from interval_coverage._table import FEWEST, HELD, Share, shares, thin
+from interval_coverage._records import KNOWN, REGIONS, SPOILS, record
+from interval_coverage._table import FEWEST, HELD, HELD_IN_REGION, Share, shares, thin
 
 SEED = 1
 PLAIN = (0, 2, 14, 16, 20, 24, 30, 34)
-SPOILED = {11: "second mode", 35: "dry friction", 47: "speed-dependent restitution", 71: "second stop"}
+SPOILED = {11: "second mode", 35: "dry friction", 95: "speed-dependent restitution", 71: "second stop"}
 
 
 @cache
@@ -37,16 +39,52 @@ def test_intervals_of_plain_records_hold_the_truth():
 
 
 def test_a_record_is_the_same_for_the_same_case_and_seed():
-    one, other = record(20, SEED), record(20, SEED)
+    one, other = record(24, SEED), record(24, SEED)
     assert one.truth == other.truth
     assert (one.values == other.values).all()
-    assert record(20, SEED + 1).truth != one.truth
-    again = record(20, SEED, 1)
+    assert record(24, SEED + 1).truth != one.truth
+    again = record(24, SEED, 1)
     assert again.truth == one.truth
     assert np.std(again.values - one.values) == pytest.approx(
         np.sqrt(2.0) * one.noise * np.max(np.abs(one.values - one.truth["offset"])), rel=0.1
     )
     assert set(SPOILED.values()) == set(SPOILS)
+
+
+def test_regions_are_drawn_evenly_with_all_that_may_be_known():
+    drawn = [record(case, SEED) for case in range(12)]
+    pairs = {(one.region, one.known) for one in drawn}
+    assert len(pairs) == len(REGIONS) * len(KNOWN)
+    for one in drawn:
+        ratio = one.truth["angular_frequency"] / one.truth["natural_frequency"]
+        hard = {REGIONS[1]: one.per_period == 50, REGIONS[2]: one.noise == 0.05, REGIONS[3]: ratio <= 0.8}
+        assert hard.get(one.region, True)
+
+
+def test_coverage_is_told_by_region_with_the_error_that_records_leave():
+    held, missed = ([0.0, 1.0, -1.0, 1.0, truth] for truth in (0.5, 2.0))
+
+    def line(region, *intervals):
+        values = {str(k): one for k, one in enumerate(intervals)}
+        return {
+            "spoil": "",
+            "known": "stop",
+            "noise": 0.01,
+            "flight_samples": 50.0,
+            "region": region,
+            "sure": {"weak_form": values},
+        }
+
+    lines = [line(REGIONS[1], *[held] * 6)] * 8 + [line(REGIONS[1], *[missed] * 6)] * 2
+    found = {share.what: share for share in shares(lines)}
+    one = found[f"{REGIONS[1]}: intervals"]
+    assert (one.hits, one.total, one.low, one.high) == (48, 60, *HELD_IN_REGION)
+    # as many intervals as a record has miss at once: ten records, not sixty intervals
+    assert one.error == pytest.approx(math.sqrt(0.8 * 0.2 / 10))
+    assert not one.missed
+    assert replace(one, error=0.02).missed
+    assert found[f"{REGIONS[1]}: records of which something is sure"].hits == 10
+    assert f"{REGIONS[0]}: intervals" not in found
 
 
 @pytest.mark.parametrize(

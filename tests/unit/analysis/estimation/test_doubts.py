@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from interval_coverage._asked import estimates_of
 from interval_coverage._motion import Body, simulate
+from interval_coverage._records import record as drawn
 from rich.console import Console
 from support.impact_records import CHAOTIC, THESIS, channel_of, record_of
 
@@ -71,7 +73,7 @@ def test_a_plain_oscillator_is_sure_and_right(plain):
             ),
             "a second mode",
         ),
-        (replace(PLAIN, friction=0.02), "or friction does"),
+        (replace(PLAIN, friction=0.04), "or friction does"),
         (
             replace(PLAIN, restitution=lambda speed: min(1.0, 0.76 * (speed / 20.0) ** -0.1)),
             "the restitution changes with the speed",
@@ -156,6 +158,28 @@ def test_a_stiffness_that_the_motion_does_not_show_is_not_given():
     for method, values in found.values.items():
         if method in METHODS and not found.reasons(method):
             assert values["natural_frequency"].standard_error < 0.1 * values["natural_frequency"].value
+
+
+def test_a_valley_of_stiffness_force_and_offset_is_not_sure():
+    # P(1,1) in noise, the forcing frequency alone known: offset and static deflection are 4 to 16 errors off
+    found = estimates_of(drawn(341, 101), methods=METHODS)
+    assert found.verdict.startswith("not sure, because ")
+    assert "stiffness, force and offset fit alike" in found.verdict
+
+
+def test_few_samples_in_a_flight_leave_the_weak_form_right():
+    # samples chosen by the kinks beside them have noise that is not 0 on average: the offset was 5.1 errors off
+    one = drawn(162, 101)
+    found = estimates_of(one, methods=["weak_form"]).values["weak_form"]
+    for name in ("natural_frequency", "static_deflection", "offset"):
+        assert abs(found[name].value - one.truth[name]) < 3.3 * found[name].standard_error
+
+
+def test_no_restitution_below_0_is_given():
+    values = {"restitution": MethodEstimate(-0.42, 0.32, -1.05, 0.2), "damping_ratio": MethodEstimate(-0.1)}
+    found = impacts._as_measured(values, 1.0)
+    assert found["restitution"] == MethodEstimate(0.0, 0.32, 0.0, 0.2)
+    assert found["damping_ratio"].value == -0.1
 
 
 def test_the_verdict_comes_first_and_doubts_follow_the_table():

@@ -2,6 +2,8 @@ import math
 
 import numpy as np
 import pytest
+from interval_coverage._records import record as drawn
+from scipy.signal import lfilter
 from support.impact_records import CHAOTIC, THESIS, WORKED, channel_of, record_of
 
 from vibroimpact.analysis.estimation.noise import noise_level
@@ -126,3 +128,30 @@ def test_free_motion_without_impacts_is_refused():
 def test_too_few_samples_are_refused():
     with pytest.raises(EstimationError, match="good samples in a row"):
         noise_level(np.arange(10.0), np.ones(10, bool))
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_forcing_far_below_resonance_hides_neither_a_known_stop_nor_its_side(known):
+    # the longest window has several flights in it: its kinks are on the other side
+    one = drawn(213, 101)
+    stop = one.truth["stop_position"]
+    found = segment(
+        one.time,
+        one.values,
+        np.ones(len(one.time), bool),
+        fastest=one.truth["angular_frequency"],
+        stop_position=stop if known else None,
+    )
+    assert found.signal.side == "upper"
+    assert found.stop_position == pytest.approx(stop, abs=0.02 * found.signal.range)
+    assert len(found.impacts) == pytest.approx(one.impacts, abs=3)
+    assert not found.passed
+
+
+@pytest.mark.parametrize("pole", [0.7, 0.9])
+def test_coloured_noise_has_no_second_stop(pole):
+    record = record_of(CHAOTIC, periods=40)
+    noise = lfilter([1.0], [1.0, -pole], np.random.default_rng(5).standard_normal(len(record.values)))
+    values = record.values + 0.01 * record.peak * noise / np.std(noise)
+    found = segment(record.time, values, np.ones(len(values), bool), fastest=CHAOTIC.angular_frequency)
+    assert found.opposite < 3
