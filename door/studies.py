@@ -76,7 +76,8 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     -------
     xarray.Dataset
         `share` of the time of a run, `change` without it (relative) and `changes` (in words) of each `effect`, the
-        dearest first; `attrs["not_simulated"]` lists what the scene does not call for.
+        dearest first; `statistics` in words where impacts are lost or the motion is chaotic;
+        `attrs["not_simulated"]` lists what the scene does not call for.
 
     Raises
     ------

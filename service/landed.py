@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,14 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import RULES
+from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG
 from vibroimpact.analysis.files.opening import opened_netcdf
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.service.run_classes import can_be_classified, codes_of
 
 READING = threading.Lock()
 """Held while a file is read or drawn: neither the library of NetCDF nor the style of a page is made for threads."""
 RANGE = "displacement_range"
 """Not in a file: the largest displacement of a run less the smallest."""
 RANGE_ENDS = ("displacement_max", "displacement_min")
+LARGEST_IMPACT = "largest_impact_velocity"
+"""Not in a file: the largest impact velocity of a run, NaN without an impact."""
+MEAN_IMPACTS = "mean_impacts_per_period"
+"""Not in a file: the mean number of impacts in a forcing period of a run, NaN without an impact."""
+CLASS = "class"
+"""Not in a file: the class of a run, as `vibroimpact classify` tells it."""
 ALONG = ("period", "impact", "stick", "comparison", "interface")
 """Dimensions, besides that of runs, whose values are shown run by run."""
 _NO_VALUES = ("run_index", "direction", "message", "final_state", "connection", "compared")
@@ -35,7 +43,14 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A variable, or a swept parameter; `along` is the dimension besides that of runs, or empty."""
+    """A variable, or a swept parameter.
+
+    Attributes
+    ----------
+    name, label, units : str
+    along : str
+        The dimension besides that of runs, or that a swept parameter shares with those that move with it; or empty.
+    """
 
     name: str
     label: str
@@ -60,6 +75,8 @@ class Landed:
     owners : ndarray of int, shape (row,)
         Which of the runs a row belongs to, by its place.
     values : ndarray of float, shape (row,)
+    is_class : bool
+        Whether the values are codes of classes (`run_classes.codes_of`).
     """
 
     quantities: tuple[Quantity, ...]
@@ -70,6 +87,7 @@ class Landed:
     coordinates: NDArray[np.float64]
     owners: NDArray[np.int64]
     values: NDArray[np.float64]
+    is_class: bool = False
 
     @property
     def size(self) -> int:
@@ -217,14 +235,21 @@ def _read(file: netCDF4.Dataset, variable: str) -> Landed | None:
     owners, values = _rows(file, found, runs.size)
     return Landed(
         quantities,
-        tuple(_quantity(file[name]) for name in axes),
+        tuple(_axis(file[name]) for name in axes),
         runs,
         file["direction"][:],
         file["outcome"][:],
         np.array([file[name][:] for name in axes], dtype=np.float64).reshape(len(axes), runs.size),
         owners,
         values,
+        variable == CLASS,
     )
+
+
+def _axis(variable: netCDF4.Variable[Any]) -> Quantity:
+    along = str(getattr(variable, SWEPT_ALONG, ""))
+    # points that are no grid stand for two parameters
+    return replace(_quantity(variable), along="" if along == SCATTERED else along)
 
 
 def _quantities(file: netCDF4.Dataset, axes: Sequence[str]) -> list[Quantity]:
@@ -239,6 +264,13 @@ def _quantities(file: netCDF4.Dataset, axes: Sequence[str]) -> list[Quantity]:
     if all(name in file.variables for name in RANGE_ENDS):
         units = _quantity(file[RANGE_ENDS[0]]).units
         shown.append(Quantity(RANGE, "range of the displacement in a run", units))
+    if "impact_velocity" in file.variables:
+        units = _quantity(file["impact_velocity"]).units
+        shown.append(Quantity(LARGEST_IMPACT, "largest impact velocity in a run", units))
+    if "impacts_per_period" in file.variables:
+        shown.append(Quantity(MEAN_IMPACTS, "impacts per forcing period, mean of a run", "1"))
+    if can_be_classified(file):
+        shown.append(Quantity(CLASS, "class of the motion", "1"))
     return sorted(shown, key=lambda one: one.name)
 
 
@@ -259,6 +291,18 @@ def _rows(
         largest = np.where(empty, np.nan, np.max(high, axis=1, initial=-np.inf, where=~np.isnan(high)))
         smallest = np.where(empty, np.nan, np.min(low, axis=1, initial=np.inf, where=~np.isnan(low)))
         return places, largest - smallest
+    if asked.name == LARGEST_IMPACT:
+        largest = np.full(count, -np.inf)
+        hit = np.repeat(places, file["impact_count"][:])
+        np.fmax.at(largest, hit, np.asarray(file["impact_velocity"][:], dtype=np.float64))
+        return places, np.where(np.isfinite(largest), largest, np.nan)
+    if asked.name == MEAN_IMPACTS:
+        each = np.asarray(file["impacts_per_period"][:], dtype=np.float64)
+        there = ~np.isnan(each)
+        mean = np.sum(each, axis=1, where=there) / np.maximum(there.sum(axis=1), 1)
+        return places, np.where(mean > 0.0, mean, np.nan)
+    if asked.name == CLASS:
+        return places, codes_of(file)
     variable = file[asked.name]
     values = np.asarray(variable[...], dtype=np.float64)
     if variable.dimensions[0] == "run":
@@ -281,4 +325,5 @@ def _joined(pieces: Sequence[Landed]) -> Landed:
         join([piece.coordinates for piece in pieces]),
         join([piece.owners + offset for piece, offset in zip(pieces, offsets, strict=True)]),
         join([piece.values for piece in pieces]),
+        first.is_class,
     )

@@ -52,7 +52,11 @@ class QuantityAnswer(BaseModel):
 
 
 class SliceAnswer(BaseModel):
-    """Columns of as many rows: `run`, `direction`, `outcome`, `value`, and one of each axis in `coordinates`."""
+    """Columns of as many rows: `run`, `direction`, `outcome`, `value`, and one of each axis in `coordinates`.
+
+    A map of more than the rows that were asked for has one of `every` values of each axis. Values of the class of runs
+    are places in `classes`, the commonest first. The `along` of an axis is the dimension that it shares with others.
+    """
 
     state: State
     total: int
@@ -64,6 +68,8 @@ class SliceAnswer(BaseModel):
     outcomes: list[str]
     rows: int
     shown: int
+    every: int
+    classes: list[str]
     run: list[int]
     direction: list[int]
     outcome: list[int]
@@ -72,7 +78,10 @@ class SliceAnswer(BaseModel):
 
 
 class PointAnswer(BaseModel):
-    """One point, simulated again: columns by the name of their variable."""
+    """One point, simulated again: columns by the name of their variable.
+
+    `stops` has the positions that limit a sampled displacement; `left_out` says what is not in the columns.
+    """
 
     run: int
     direction: str
@@ -80,6 +89,8 @@ class PointAnswer(BaseModel):
     outcome: str
     message: str
     units: dict[str, str]
+    stops: dict[str, list[float]]
+    left_out: list[str]
     samples: dict[str, Column]
     impacts: dict[str, Column]
     periods: dict[str, Column]
@@ -240,7 +251,7 @@ def _empty() -> dict[str, Any]:
     columns: dict[str, list[Any]] = {
         name: [] for name in ("run", "direction", "outcome", "coordinates", "value")
     }
-    return {"rows": 0, "shown": 0, **columns}
+    return {"rows": 0, "shown": 0, "every": 1, "classes": [], **columns}
 
 
 def _quantity(one: Quantity) -> QuantityAnswer:

@@ -39,7 +39,9 @@ from vibroimpact.orchestrator.campaign.manifest import read_manifest
 from vibroimpact.orchestrator.campaign.rounds import Rounds, adaptive_axes
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.models import TimeSeries
+from vibroimpact.orchestrator.scene.places import observed_location, observed_mass, stop_location, stop_mass
 from vibroimpact.orchestrator.scene.sweep import Branch, expand
 from vibroimpact.service.landed import files_of
 from vibroimpact.service.slices import finite
@@ -48,8 +50,8 @@ MOST_PERIODS = 20
 """Periods that are shown, of those that are recorded."""
 PER_PERIOD = 200
 """Samples in a forcing period."""
-MOST_SAMPLES = 4000
-"""Samples that are shown."""
+MOST_SAMPLES = MOST_PERIODS * PER_PERIOD + 1
+"""Samples that are shown: of so many periods, both ends included."""
 OBSERVED = ("displacement", "velocity")
 
 
@@ -92,6 +94,8 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
         "outcome": record.outcome.name,
         "message": record.message,
         "units": _units(scene, [name for columns in motion.values() for name in columns]),
+        "stops": _stops(scene.at(place.point.values), names),
+        "left_out": _left_out(scene, watched, record),
         **motion,
     }
 
@@ -159,12 +163,56 @@ def _watched(scene: Scene, place: BranchPoint) -> Scene:
     if record.recorded_periods and period:
         rate = PER_PERIOD / period
     else:
-        rate = MOST_SAMPLES / record.recorded_time if record.recorded_time else PER_PERIOD
+        rate = (MOST_SAMPLES - 1) / record.recorded_time if record.recorded_time else PER_PERIOD
     others = record.time_series.variables if record.time_series is not None else ()
     series = TimeSeries(rate=rate, variables=tuple(dict.fromkeys((*OBSERVED, *others))))
     return scene.model_copy(
         update={"record": record.model_copy(update={"time_series": series, "impacts": True, "strobe": True})}
     )
+
+
+def _stops(scene: Scene, names: Sequence[str]) -> dict[str, list[float]]:
+    """Return the positions (m) of the stops that limit each sampled displacement, by its name."""
+    found: dict[str, list[float]] = {}
+    body = scene.body if scene.general is None else None
+    points: list[float | None] = [None] * len(scene.stops)
+    observed: float | None = None
+    if isinstance(body, ChainBody):
+        points = [stop_mass(body, stop) for stop in scene.stops]
+        observed = observed_mass(body, scene.stops)
+    elif isinstance(body, BeamBody):
+        points = [stop_location(stop) for stop in scene.stops]
+        observed = observed_location(body, scene.stops, scene.sensor)
+    for name in names:
+        word, _, number = name.rstrip("]").partition("[")
+        for place, (stop, point) in enumerate(zip(scene.stops, points, strict=True), start=1):
+            limited = {
+                "displacement": point == observed and not number,
+                "contact_displacement": number == str(place),
+            }
+            is_of_mass = isinstance(body, ChainBody) and word == "displacement" and number == str(point)
+            if limited.get(word, False) or is_of_mass:
+                found.setdefault(name, []).append(stop.position)
+    return found
+
+
+def _left_out(scene: Scene, watched: Scene, record: RunRecord) -> list[str]:
+    """Return what of the run is not shown, a sentence each."""
+    found = []
+    own, shown = scene.record.recorded_periods, watched.record.recorded_periods
+    if own and shown and shown < own:
+        found.append(f"The first {shown} of {own} recorded periods are shown.")
+    samples = 0 if record.samples is None else len(record.samples)
+    if samples > MOST_SAMPLES:
+        found.append(f"One of {_every(samples)} of {samples} samples is drawn.")
+    for words, rows in (("impacts", record.impacts), ("periods", record.periods)):
+        if rows is not None and len(rows) > MOST_SAMPLES:
+            found.append(f"The first {MOST_SAMPLES} of {len(rows)} {words} are shown.")
+    return found
+
+
+def _every(samples: int) -> int:
+    return max(1, -(-samples // MOST_SAMPLES))
 
 
 def _units(scene: Scene, names: Sequence[str]) -> dict[str, str]:
@@ -181,8 +229,7 @@ def _units(scene: Scene, names: Sequence[str]) -> dict[str, str]:
 def _samples(record: RunRecord, names: tuple[str, ...]) -> dict[str, list[float | None]]:
     if record.samples is None:
         return {}
-    step = max(1, -(-len(record.samples) // MOST_SAMPLES))
-    return _columns(record.samples[::step], ("time", *names))
+    return _columns(record.samples[:: _every(len(record.samples))], ("time", *names))
 
 
 def _columns(rows: Any, names: tuple[str, ...]) -> dict[str, list[float | None]]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.service.landed import Landed
+from vibroimpact.service.run_classes import named_classes
 
 LEVELS = 2000
 """Values of a run that differ by less than this share of the range of all are one point of a diagram."""
@@ -82,40 +83,59 @@ def _read(option: str, word: str, count: int) -> tuple[str, list[float]]:
 
 
 def slice_of(landed: Landed, selection: Selection, most: int) -> dict[str, Any]:
-    """Return columns of at most `most` rows (a map: of about as many): run, direction, outcome, coordinates, value."""
-    kept = selection.runs(landed)
+    """Return columns of at most `most` rows: run, direction, outcome, coordinates, value.
+
+    `rows` is how many there are, `every` how many values of each axis of a map one is taken of.
+    """
+    kept, every = selection.runs(landed), 1
     per_run = landed.owners.size == landed.runs.size
-    if per_run and len(landed.axes) - len(selection.at) > 1:
-        kept = kept & _coarser_grid(landed.coordinates[:, kept], kept, most)
+    spanned = _spanned(landed, selection)
+    total = int(kept.sum()) if per_run else 0
+    if per_run and len(spanned) > 1:
+        chosen = landed.coordinates[spanned][:, kept]
+        every = max(1, math.ceil(math.sqrt(chosen.shape[1] / most)))
+        # ends of axes count too: a map that is thinned further by its rows would have gaps
+        while (coarser := _coarser_grid(chosen, every)).sum() > most and every < chosen.shape[1]:
+            every += 1
+        kept[np.flatnonzero(kept)[~coarser]] = False
     rows = np.flatnonzero(kept[landed.owners])
     if not per_run:
         rows = rows[_distinct(landed.owners[rows], landed.values[rows])]
-    total = rows.size
+        total = rows.size
     if rows.size > most:
         rows = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
     owners = landed.owners[rows]
+    classes, values = named_classes(landed.values[rows]) if landed.is_class else ([], landed.values[rows])
     return {
         "rows": int(total),
         "shown": int(rows.size),
+        "every": every,
+        "classes": classes,
         "run": landed.runs[owners].tolist(),
         "direction": landed.directions[owners].tolist(),
         "outcome": landed.outcomes[owners].tolist(),
         "coordinates": [finite(column[owners]) for column in landed.coordinates],
-        "value": finite(landed.values[rows]),
+        "value": finite(values),
     }
 
 
-def _coarser_grid(coordinates: NDArray[np.float64], kept: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
-    """Return the runs on every second, third, ... value of each axis, so that a map has no gaps but larger cells."""
-    found = kept.copy()
-    step = math.ceil(math.sqrt(coordinates.shape[1] / most)) if coordinates.shape[1] else 1
-    if step > 1:
-        chosen = np.ones(coordinates.shape[1], dtype=bool)
+def _spanned(landed: Landed, selection: Selection) -> list[int]:
+    """Return the places of the axes that are not held, one of those that move together."""
+    first: dict[str, int] = {}
+    for place, axis in enumerate(landed.axes):
+        if axis.name not in selection.at:
+            first.setdefault(axis.along or axis.name, place)
+    return list(first.values())
+
+
+def _coarser_grid(coordinates: NDArray[np.float64], every: int) -> NDArray[np.bool_]:
+    """Return which runs lie on every so many values of each axis, so that a map has no gaps but larger cells."""
+    chosen = np.ones(coordinates.shape[1], dtype=bool)
+    if every > 1:
         for column in coordinates:
             _, places = np.unique(column, return_inverse=True)
-            chosen &= places % step == 0
-        found[np.flatnonzero(kept)[~chosen]] = False
-    return found
+            chosen &= places % every == 0
+    return chosen
 
 
 def _distinct(owners: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -139,7 +139,7 @@ def _the_run(dataset: xr.Dataset, exact: bool, selection: dict[str, Any]) -> tup
         left &= _matches(name, columns[name], left, value, exact)
     found = np.flatnonzero(left)
     if found.size != 1:
-        raise DatasetError(_not_one(columns, found, selection))
+        raise DatasetError(_not_one(columns, found, selection, run_id.dims))
     point = {name: values[found[0]] for name, values in columns.items() if name != "run_id"}
     return int(run_id.values.ravel()[found[0]]), point
 
@@ -208,7 +208,12 @@ def _span(there: NDArray[Any]) -> str:
     return f"a value of {there[0]:g} to {there[-1]:g}"
 
 
-def _not_one(columns: dict[str, NDArray[Any]], found: NDArray[np.intp], selection: dict[str, Any]) -> str:
+def _not_one(
+    columns: dict[str, NDArray[Any]],
+    found: NDArray[np.intp],
+    selection: dict[str, Any],
+    dims: tuple[Any, ...],
+) -> str:
     """Return the message for a selection that names no run or several."""
     given = names_list([f"{name}={value!r}" for name, value in selection.items()])
     if found.size == 0:
@@ -216,7 +221,9 @@ def _not_one(columns: dict[str, NDArray[Any]], found: NDArray[np.intp], selectio
     several = [
         n for n, v in columns.items() if n not in ("run_id", "run_index") and np.unique(v[found]).size > 1
     ]
+    # one value along a dimension is enough, whatever moves along it
+    axes = [name for name in several if name in dims]
     return (
         f"selection: expected one run, got {found.size} for {given}. "
-        f"Give a value for {names_list(several or ['run_id'])} too."
+        f"Give a value for {names_list(axes or several or ['run_id'])} too."
     )

@@ -28,6 +28,7 @@ from vibroimpact.analysis.dataset.schema import (
     SWEPT_ALONG,
     Direction,
     constant_names,
+    standing_for,
     swept_names,
 )
 from vibroimpact.analysis.files.lazy_store import LazyStore
@@ -131,8 +132,9 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a dataset on the real dimensions of its sweep.
 
     Per-run variables get the dimensions `direction` (where the sweep has directions) and one for each swept
-    parameter; points that no run covers are NaN, or -1 in integers. With independent runs only, `direction`
-    is a scalar coordinate; one run without swept parameters has scalars only. Runs that are no grid
+    parameter. Parameters that move together share one; its coordinate has the values of the first of them whose
+    values all differ, else numbers from 0. Points that no run covers are NaN, or -1 in integers. With independent runs
+    only, `direction` is a scalar coordinate; one run without swept parameters has scalars only. Runs that are no grid
     (scattered or repeated points) keep the dimension `run`. Impacts, sticks, samples and events stay on their
     own dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
     `energy_residual` is along `connection`, the names of the connections; scores of replays are along `compared`.
@@ -248,7 +250,9 @@ def _saved_again(opened: xr.Dataset) -> xr.Dataset:
     """Return an opened dataset as it was before `to_netcdf` marked what is missing."""
     for variable in opened.variables.values():
         variable.attrs.pop("_FillValue", None)
-    return opened
+    # version 0.2 saved no coordinate along a shared dimension
+    axes = _shared_axes({name: opened.variables[name] for name in swept_names(opened)})
+    return opened.assign_coords({name: axis for name, axis in axes.items() if name not in opened.variables})
 
 
 def _fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
@@ -385,10 +389,30 @@ def _grid(
             axes[name] = new(dimension, column, flat.variables[name].attrs)
         sizes[dimension] = len(values)
         places.append(place)
+    axes |= _shared_axes(axes)
     run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])
     if run_id is None:
         return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
     return tuple(sizes), axes, scalars, run_id
+
+
+def _shared_axes(columns: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+    """Return the coordinate of each dimension that parameters share: values of one of them, or numbers from 0."""
+    along: dict[str, dict[str, NDArray[np.float64]]] = {}
+    for name, column in columns.items():
+        if column.attrs.get(SWEPT_ALONG) in column.dims:
+            along.setdefault(column.attrs[SWEPT_ALONG], {})[name] = column.values
+    axes: dict[str, xr.Variable] = {}
+    for dimension, members in along.items():
+        chosen = standing_for(dimension, members)
+        if chosen is None:
+            numbers = np.arange(len(next(iter(members.values()))))
+            attributes = {"long_name": f"place along {dimension}", "units": "1"}
+            axes[dimension] = new_axis(dimension, numbers, attributes)
+        else:
+            attributes = {key: value for key, value in columns[chosen].attrs.items() if key != SWEPT_ALONG}
+            axes[dimension] = new_axis(dimension, members[chosen], attributes)
+    return axes
 
 
 def _swept_along(flat: xr.Dataset) -> dict[str, list[str]]:

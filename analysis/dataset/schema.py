@@ -287,6 +287,10 @@ RESERVED_NAMES = frozenset(
 """Names that mean something in a stored or opened dataset; nothing else may take them."""
 SWEPT_ALONG = "swept_along"
 """Attribute of a swept parameter: the dimension that it shares with those that move with it."""
+DRAW = "draw"
+"""Dimension of the points that are drawn; `sample` is that of time series."""
+SCATTERED = "point"
+"""Dimension of the points of two adaptive axes, which are no grid."""
 NOT_SWEPT = {"swept": "no"}
 """Attribute of the numbers of a scene that are the same for all of its runs; scalar coordinates."""
 
@@ -454,13 +458,41 @@ def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:
 
 def swept_names(dataset: xr.Dataset) -> tuple[str, ...]:
     """Return the names of the swept parameters; those that a selection has made scalar are among them."""
+    # the axis of parameters that move together has the values of one of them
+    shared = {coordinate.attrs.get(SWEPT_ALONG) for coordinate in dataset.coords.values()}
     return tuple(
         str(name)
         for name, coordinate in dataset.coords.items()
-        if name not in RESERVED_NAMES
+        if name not in RESERVED_NAMES | shared
         and coordinate.dtype.kind == "f"
         and not _is_constant(coordinate.variable)
     )
+
+
+def standing_for(dimension: str, columns: Mapping[str, NDArray[np.float64]]) -> str | None:
+    """Return the parameter whose values are the axis of those that share a dimension.
+
+    It is the first whose values all differ.
+
+    Parameters
+    ----------
+    dimension : str
+    columns : mapping of str to ndarray of float, shape (point,)
+        The values of each parameter along it, in the order of the scene.
+
+    Returns
+    -------
+    str or None
+        None where the points are numbered: none of several drawn or adaptive parameters stands for all.
+
+    Examples
+    --------
+    >>> standing_for("size", {"mass": np.array([1.0, 1.0]), "stiffness": np.array([4.0, 5.0])})
+    'stiffness'
+    """
+    if len(columns) > 1 and dimension in (DRAW, SCATTERED):
+        return None
+    return next((name for name, values in columns.items() if np.unique(values).size == values.size), None)
 
 
 def constant_names(dataset: xr.Dataset) -> tuple[str, ...]:

@@ -8,13 +8,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.schema import SWEPT_ALONG, names_list, scene_of, swept_names
+from vibroimpact.analysis.dataset.schema import DRAW, SWEPT_ALONG, names_list, scene_of, swept_names
 from vibroimpact.fmus.errors import DatasetError
 
 Floats = NDArray[np.float64]
 
-DRAW = "draw"
-"""Dimension of the points that are drawn."""
 _ADVICE = 'Sweep two keys or more with a distribution and sample = { design = "saltelli", points = 256 }.'
 
 

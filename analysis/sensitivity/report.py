@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import Row, described
-from vibroimpact.analysis.sensitivity.design import DRAW, design_of
+from vibroimpact.analysis.dataset.schema import DRAW
+from vibroimpact.analysis.sensitivity.design import design_of
 from vibroimpact.analysis.sensitivity.indices import FEWEST_BLOCKS, sobol_indices
 from vibroimpact.analysis.sensitivity.quantities import quantities_of
 from vibroimpact.fmus.errors import DatasetError, UsageError

@@ -21,6 +21,8 @@ from typing import Any, Literal, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.schema import SCATTERED
+
 SweepPath = Literal["independent", "up", "down", "up-down"]
 SweepDirection = Literal["independent", "up", "down"]
 
@@ -113,9 +115,6 @@ def log_axis(key: str, start: float, stop: float, points: int, path: SweepPath) 
     values = (start, *inner, stop) if points > 1 else (start,)
     return SweepAxis(key, values if path == "independent" else tuple(sorted(values)), path)
 
-
-SCATTERED = "point"
-"""Dimension of a dataset of two adaptive axes, whose points are no grid."""
 
 Dimension = tuple[SweepAxis, ...]
 """The axes that move together: one alone, or several of as many values."""

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from pydantic import ValidationError
 
-from vibroimpact.analysis.dataset.schema import RESERVED_NAMES
+from vibroimpact.analysis.dataset.schema import DRAW, RESERVED_NAMES, SCATTERED
 from vibroimpact.orchestrator.scene.designs import (
     BALANCED,
     Quantile,
@@ -24,7 +24,6 @@ from vibroimpact.orchestrator.scene.designs import (
 from vibroimpact.orchestrator.scene.fields import listed
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, problems_of, quoted, read_table
 from vibroimpact.orchestrator.scene.sweep import (
-    SCATTERED,
     Adaptive,
     SweepAxis,
     axis_of_range,
@@ -37,8 +36,6 @@ from vibroimpact.orchestrator.scene.sweep_models import MOST_POINTS_PER_AXIS, Ax
 FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 SAMPLE = "sample"
 """The entry of `[sweep]` that is no key."""
-DRAW = "draw"
-"""Dimension of the points that are drawn; `sample` is that of time series."""
 _SAMPLE_FORM = '{ design = "sobol", points = 256 }'
 _MOST_ADAPTIVE = 2
 _RANGE = ("start", "stop", "points")

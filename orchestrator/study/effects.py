@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,10 +24,21 @@ from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import DAMPING
 from vibroimpact.orchestrator.scene.summary import effects as called_effects
 from vibroimpact.orchestrator.scene.summary import laws
-from vibroimpact.orchestrator.study.errors import Scales, errors_of
+from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
-from vibroimpact.orchestrator.study.references import scales_of
+from vibroimpact.orchestrator.study.motion import (
+    CHAOS,
+    REPLICATES,
+    Motion,
+    is_chaotic,
+    motion_of,
+    motions_in_words,
+    rows_of_motions,
+)
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.references import disturbed_scenes, observed, scales_of
 from vibroimpact.orchestrator.study.replays import ReplayTrial
+from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.way import SceneTrial, opened_trial
 
 PAIRS = 5
@@ -80,6 +91,10 @@ class Share:
         What is otherwise without it, in words.
     change : float
         Largest relative change of what both runs show; NaN where they cannot be compared.
+    motions : tuple of Motion, or None
+        What the motions with and without it are as a whole, where impacts are lost or a motion is chaotic.
+    statistics : Statistics or None
+        Likewise how far distributions are apart, of a replay and of a general scene.
     """
 
     effect: Effect
@@ -87,11 +102,18 @@ class Share:
     full: float
     changes: str
     change: float
+    motions: tuple[Motion, Motion] | None = None
+    statistics: Statistics | None = None
 
     @property
     def share(self) -> float:
         """Median share of the time of a run."""
         return float(np.median(self.seconds)) / self.full
+
+    @property
+    def statistics_in_words(self) -> str:
+        """What is otherwise as a whole without it; empty where impacts are compared one by one."""
+        return motions_in_words(self.motions, self.statistics)
 
 
 def effects_of(scene: Scene) -> list[Effect]:
@@ -299,11 +321,11 @@ def shares_of(
         Given each as soon as it is known.
     """
     found = []
-    scales = scales_of(scene)
+    compared = _Compared(scene)
     with opened(scene) as full:
         whole = float(np.median([clock.CLOCK.processor_time(full) for _ in range(PAIRS)]))
     for effect in effects:
-        share = _share(effect, whole, scales)
+        share = _share(effect, whole, compared)
         told(share)
         found.append(share)
     return sorted(found, key=lambda share: -share.share if share.share == share.share else math.inf)
@@ -319,28 +341,67 @@ def opened(scene: Scene) -> Iterator[SceneTrial | ReplayTrial]:
         trial.close()
 
 
-def _share(effect: Effect, whole: float, scales: Scales) -> Share:
+def _share(effect: Effect, whole: float, compared: _Compared) -> Share:
     try:
         with opened(effect.base) as full, opened(effect.without) as trial:
             reference, alone = full.run(), trial.run()
             gc.collect()
             time_of = clock.CLOCK.processor_time
             pairs = np.array([(time_of(full), time_of(trial)) for _ in range(PAIRS)])
+        share = Share(effect, pairs[:, 0] - pairs[:, 1], whole, NOT_RECORDED, 0.0)
+        return share if effect.keeps_motion else compared.share(share, alone, reference)
     except ComponentError as error:
         return _failed(effect, error)
-    seconds = pairs[:, 0] - pairs[:, 1]
-    if effect.keeps_motion:
-        return Share(effect, seconds, whole, NOT_RECORDED, 0.0)
-    errors = errors_of(alone, reference, scales)
-    change = errors.worst()
-    words = (
-        errors.failure.replace("missed", "loses")
-        .replace("that are none", "more")
-        .replace("that is none", "more")
-    )
-    if not words:
-        words = NO_CHANGE if change == 0.0 else f"up to {100.0 * change:.3g} %"
-    return Share(effect, seconds, whole, words, change)
+
+
+class _Compared:
+    """Compares runs with and without an effect: impact by impact, else by what the motions are as a whole.
+
+    Parameters
+    ----------
+    scene : Scene
+        With all of its effects.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._scales = scene, scales_of(scene)
+        self._motions: dict[Scene, Motion | None] = {}
+
+    def share(self, share: Share, alone: Observation, reference: Observation) -> Share:
+        """Return a share with what is otherwise without its effect."""
+        errors = errors_of(alone, reference, self._scales)
+        lost = (
+            errors.failure.replace("missed", "loses")
+            .replace("that are none", "more")
+            .replace("that is none", "more")
+        )
+        change = math.nan if lost else errors.worst()
+        words = lost or (NO_CHANGE if change == 0.0 else f"up to {100.0 * change:.3g} %")
+        share = replace(share, changes=words, change=change)
+        if alone.failure:
+            return share
+        if self._scene.general is not None:
+            return self._by_samples(share, alone, reference)
+        base = share.effect.base
+        if base not in self._motions:
+            self._motions[base] = motion_of(base)
+        full = self._motions[base]
+        if full is None or not (lost or full.chaotic):
+            return share
+        share = replace(share, changes=lost or CHAOS, change=math.nan)
+        if self._scene.replay is not None:
+            share = replace(share, statistics=statistics_of(alone, reference, ()))
+        without = motion_of(share.effect.without)
+        return share if without is None else replace(share, motions=(full, without))
+
+    def _by_samples(self, share: Share, alone: Observation, reference: Observation) -> Share:
+        """Add the distributions of what a general scene samples where its motion is chaotic."""
+        replicates = [observed(one) for one in disturbed_scenes(share.effect.base, REPLICATES)]
+        if not is_chaotic(reference, replicates, self._scales):
+            return share
+        known = [one for one in replicates if not one.failure]
+        changes = f"{CHAOS}, {share.changes}"
+        return replace(share, changes=changes, statistics=statistics_of(alone, reference, known))
 
 
 def _failed(effect: Effect, error: Exception) -> Share:
@@ -379,11 +440,16 @@ def dataset_of_shares(
         ),
         "change": ("effect", [share.change for share in shares], "1", "largest relative change without it"),
     }
-    dataset = xr.Dataset(described(rows))
+    motions = [share.motions for share in shares]
+    as_a_whole = rows_of_motions(motions, [share.statistics for share in shares], scene.units)
+    dataset = xr.Dataset(described({**rows, **as_a_whole}))
     for name, words, texts in (
         ("name", "effect", [share.effect.name for share in shares]),
         ("asked_by", "what asks for it", [share.effect.asked_by for share in shares]),
         ("changes", "what is otherwise without it", [share.changes for share in shares]),
+        ("statistics", "what is otherwise as a whole", [share.statistics_in_words for share in shares]),
+        ("orbit", "class of the motion", [pair[0].orbit if pair else "" for pair in motions]),
+        ("orbit_without", "class without it", [pair[1].orbit if pair else "" for pair in motions]),
     ):
         dataset[name] = ("effect", np.array(texts, dtype=object), {"units": "1", "long_name": words})
     return dataset.assign_attrs(

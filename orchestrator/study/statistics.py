@@ -50,8 +50,8 @@ def statistics_of(
     Statistics or None
         None where there are too few impacts.
     """
-    apart = _off if len(reference.impacts) else _off_samples
-    if min(_told(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
+    apart, told = (_off, _impacts) if len(reference.impacts) else (_off_samples, _samples)
+    if min(told(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
         return None
     interval, distance = apart(found, reference)
     by_chance = [apart(one, reference) for one in replicates]
@@ -63,9 +63,12 @@ def statistics_of(
     )
 
 
-def _told(found: Observation) -> int:
-    """Return how many impacts, or samples where there are none, a run tells."""
-    return len(found.impacts) or (0 if found.samples is None else len(found.samples))
+def _impacts(found: Observation) -> int:
+    return len(found.impacts)
+
+
+def _samples(found: Observation) -> int:
+    return 0 if found.samples is None else len(found.samples)
 
 
 def _off(found: Observation, other: Observation) -> tuple[float, float]:

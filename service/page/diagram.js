@@ -3,11 +3,14 @@
 import { ask, campaignPath } from "./api.js";
 import { choice, element, inWords, short, table } from "./dom.js";
 import { Plot } from "./plot.js";
-import { extent } from "./scale.js";
+import { coloursOf, extent } from "./scale.js";
 
 const PAUSE = 700; // milliseconds between two looks at what has landed
 const TABLE_ROWS = 200;
 const MAP = "map";
+const MOST = 12000; // rows that are drawn
+const DRAW = "draw"; // the dimension of points that are drawn
+const CLASS = "class"; // a variable of maps alone: its values are names
 const MAP_ROOM = 0.25; // part of what is shown of a map that is asked for beside it
 const FAILED = ["impact_limit", "error", "crash", "timeout"];
 const COLOURS = { up: "one", down: "two", independent: "one" };
@@ -56,7 +59,7 @@ export class Diagram {
   }
 
   question() {
-    const asked = new URLSearchParams({ most: "6000" });
+    const asked = new URLSearchParams({ most: String(MOST) });
     if (this.variable) asked.set("variable", this.variable);
     for (const [name, value] of Object.entries(this.held)) asked.append("at", `${name}:${value}`);
     for (const [name, [low, high]] of Object.entries(this.within)) asked.append("within", `${name}:${low}:${high}`);
@@ -67,6 +70,7 @@ export class Diagram {
     const first = !this.data?.variable && data.variable;
     this.data = data;
     if (!data.variable) return;
+    this.variable ??= data.variable.name;
     data.axes.forEach((axis, number) => {
       const seen = new Set([...(this.levels[axis.name] ?? []), ...data.coordinates[number]]);
       this.levels[axis.name] = [...seen].filter((value) => value !== null).sort((a, b) => a - b);
@@ -79,9 +83,8 @@ export class Diagram {
 
   /** Choose what is shown at first; return whether that asks for other values. */
   begin(data) {
-    const several = data.axes.length > 1;
     const range = data.variables.find((one) => one.name === "displacement_range");
-    const hasMap = several && !movesTogether(data) && (range || !data.variable.along);
+    const hasMap = spanning(data.axes).length > 1 && (range || !data.variable.along);
     this.along = hasMap ? MAP : data.axes[0]?.name;
     this.variable = hasMap && range ? range.name : data.variable.name;
     this.hold();
@@ -92,11 +95,17 @@ export class Diagram {
 
   /** Hold the axes that are not shown at values in their middle. */
   hold() {
-    const shown = this.along === MAP ? this.data.axes.slice(0, 2).map((axis) => axis.name) : [this.along];
-    const others = movesTogether(this.data) ? [] : this.data.axes.filter((axis) => !shown.includes(axis.name));
+    const shown = this.along === MAP ? this.mapped().map(placeOf) : this.data.axes.filter((axis) => axis.name === this.along).map(placeOf);
+    const others = spanning(this.data.axes).filter((axis) => !shown.includes(placeOf(axis)));
     this.held = Object.fromEntries(others.map(({ name }) => [name, this.held[name] ?? middle(this.levels[name])]));
     this.within = {};
     this.plot.view = null;
+  }
+
+  /** Return the two axes of a map: drawn keys, too, but one alone of those that are zipped. */
+  mapped() {
+    const { axes } = this.data, spans = spanning(axes);
+    return axes.filter((axis) => axis.along === DRAW || spans.includes(axis)).slice(0, 2);
   }
 
   change(values) {
@@ -110,11 +119,12 @@ export class Diagram {
     const state = JSON.stringify([this.variable, this.along, this.held, variables.length, this.levels.length]);
     if (state === this.controlState) return; // a list that is open stays open
     this.controlState = state;
-    const usable = variables.filter((one) => this.along !== MAP || !one.along);
+    const usable = variables.filter((one) => (this.along === MAP ? !one.along : one.name !== CLASS));
     const made = [choice("Variable", usable.map((one) => [one.name, inWords(one)]), this.variable, (variable) => this.change({ variable }))];
     if (axes.length > 1) {
-      const ways = [[MAP, `Map of ${axes[0].label}, ${axes[1].label}`], ...axes.map((axis) => [axis.name, `Over ${axis.label}`])];
-      made.push(choice("Show", ways, this.along, (along) => this.change({ along, variable: along === MAP && this.data.variable.along ? "displacement_range" : this.variable })));
+      const [across, up] = this.mapped();
+      const ways = [...(up ? [[MAP, `Map of ${across.label}, ${up.label}`]] : []), ...axes.map((axis) => [axis.name, `Over ${axis.label}`])];
+      made.push(choice("Show", ways, this.along, (along) => this.change({ along, variable: this.variableOver(along) })));
     }
     for (const name of Object.keys(this.held)) {
       const axis = axes.find((one) => one.name === name);
@@ -129,13 +139,20 @@ export class Diagram {
     this.controls.replaceChildren(...made);
   }
 
+  /** Return the variable that is shown next: not all of them can be shown over an axis, or as a map. */
+  variableOver(along) {
+    if (along === MAP) return this.data.variable.along ? "displacement_range" : this.variable;
+    return this.variable === CLASS ? null : this.variable;
+  }
+
   draw() {
-    const { axes, rows, shown, landed, total, variable } = this.data;
+    const { axes, rows, shown, every, landed, total, variable } = this.data;
     if (!axes.length) return;
     const content = this.along === MAP ? this.map() : this.branches();
     this.plot.canvas.dataset.points = content.layers.reduce((sum, layer) => sum + layer.xs.length, 0);
     this.plot.show(content);
-    const thinned = shown < rows ? `; ${shown} of ${rows} different values are drawn, more where you zoom in` : "";
+    const what = every > 1 ? `points, one of ${every} values of each axis,` : "different values";
+    const thinned = shown < rows ? `; ${shown} of ${rows} ${what} are drawn, more where you zoom in` : "";
     const nothing = landed && !this.data.value.some((one) => one !== null) ? "; none of them has a value of this variable" : "";
     this.said.textContent = `${inWords(variable)}: ${landed} of ${Math.max(total, landed)} points${nothing}${thinned}.`;
     this.fillTable();
@@ -157,24 +174,31 @@ export class Diagram {
   }
 
   map() {
-    const { axes, coordinates, value, run, direction, variable } = this.data;
+    const { axes, classes, coordinates, value, run, direction, variable } = this.data;
+    const [across, up] = this.mapped().map((axis) => axes.indexOf(axis));
     const places = run.map((_, place) => place).filter((place) => this.direction === null || direction[place] === this.direction);
     const of = (column) => places.map((place) => column[place]);
     const values = of(value);
-    const layer = { kind: isGrid(this.data) ? "cells" : "nearest", xs: of(coordinates[0]), ys: of(coordinates[1]), values, runs: of(run), range: extent([values], 0), bar: inWords(variable) };
-    return { layers: [layer], x: { label: inWords(axes[0]), log: isLog(coordinates[0]) }, y: { label: inWords(axes[1]), log: isLog(coordinates[1]) } };
+    const named = classes.length ? { classes, colours: coloursOf(classes) } : { range: extent([values], 0), bar: inWords(variable) };
+    const layer = { kind: isGrid(coordinates[across], coordinates[up], this.data.total) ? "cells" : "nearest", xs: of(coordinates[across]), ys: of(coordinates[up]), values, runs: of(run), ...named };
+    return { layers: [layer], x: { label: inWords(axes[across]), log: isLog(coordinates[across]) }, y: { label: inWords(axes[up]), log: isLog(coordinates[up]) } };
   }
 
   words(layer, place) {
     const { axes, variable } = this.data;
-    const [across, up] = this.along === MAP ? axes : [axes.find((axis) => axis.name === this.along) ?? axes[0], variable];
+    const [across, up] = this.along === MAP ? this.mapped() : [axes.find((axis) => axis.name === this.along) ?? axes[0], variable];
     const lines = [`${inWords(across)}: ${short(layer.xs[place])}`, `${inWords(up)}: ${short(layer.ys[place])}`];
-    if (layer.values) lines.push(`${inWords(variable)}: ${short(layer.values[place])}`);
+    if (layer.values) lines.push(`${inWords(variable)}: ${this.told(layer.values[place])}`);
     return [...lines, `point ${layer.runs[place]}${layer.name ? `, ${layer.name}` : ""}`].join("\n");
   }
 
+  /** Return a value in words: the name of a class, or a number. */
+  told(value) {
+    return this.data.classes[value] ?? short(value);
+  }
+
   zoomed(view) {
-    const shown = this.along === MAP ? this.data.axes.slice(0, 2).map((axis) => axis.name) : [this.along];
+    const shown = this.along === MAP ? this.mapped().map((axis) => axis.name) : [this.along];
     const room = this.along === MAP ? MAP_ROOM : 0; // what lies beside a map colours its edge
     const wider = ([low, high]) => [low - room * (high - low), high + room * (high - low)];
     this.within = view ? Object.fromEntries(shown.map((name, place) => [name, wider([view.x, view.y][place])])) : {};
@@ -186,7 +210,7 @@ export class Diagram {
     const { axes, coordinates, value, run, direction, directions, outcome, outcomes, variable } = this.data;
     const names = ["Point", ...axes.map(inWords), "Direction", "Outcome", inWords(variable)];
     const rows = run.slice(0, TABLE_ROWS).map((number, place) =>
-      [number, ...coordinates.map((column) => column[place]), directions[direction[place]], outcomes[outcome[place]], value[place]]);
+      [number, ...coordinates.map((column) => column[place]), directions[direction[place]], outcomes[outcome[place]], this.data.classes[value[place]] ?? value[place]]);
     this.rows.replaceChildren(table(`The first ${rows.length} values`, names, rows));
   }
 }
@@ -195,15 +219,18 @@ function middle(values) {
   return values[Math.floor(values.length / 2)];
 }
 
-/** Whether swept parameters move together or are drawn, so that none of them can be held. */
-function movesTogether({ axes, coordinates }) {
-  if (axes.length < 2) return false;
-  const distinct = coordinates.map((column) => new Set(column).size), points = new Set(coordinates[0].map((_, place) => coordinates.map((column) => column[place]).join())).size;
-  return points > 1 && distinct.every((count) => count === points);
+/** Return where an axis lies: those that move together, or are drawn, lie along one dimension. */
+function placeOf({ name, along }) {
+  return along || name;
 }
 
-/** Whether the first two coordinates are those of a grid, of which not all points have to be there yet. */
-function isGrid({ coordinates: [across, up], total }) {
+/** Return the axes that span the sweep: the first of those that move together. */
+function spanning(axes) {
+  return axes.filter((axis, number) => axes.findIndex((one) => placeOf(one) === placeOf(axis)) === number);
+}
+
+/** Whether two coordinates are those of a grid, of which not all points have to be there yet. */
+function isGrid(across, up, total) {
   return new Set(across).size * new Set(up).size <= total;
 }
 

@@ -15,6 +15,12 @@ export function isMap({ kind }) {
   return kind === "cells" || kind === "nearest";
 }
 
+/** Return columns with a gap at the first of the ascending `time` from each instant on: no line is drawn across a jump. */
+export function withGaps(columns, time, instants = []) {
+  const jumps = new Set(instants.map((instant) => time.findIndex((one) => one >= instant)).filter((place) => place > 0));
+  return columns.map((column) => column.flatMap((value, place) => (jumps.has(place) ? [null, value] : [value])));
+}
+
 const DRAWN = {
   points(pen, { xs, ys, size = 3 }, x, y) {
     for (let place = 0; place < xs.length; place++) {
@@ -34,6 +40,19 @@ const DRAWN = {
     }
     pen.stroke();
   },
+  /** Lines across the whole plot, at values of one of its axes. */
+  limits(pen, { at, across }, x, y, box) {
+    pen.lineWidth = 1.2;
+    pen.setLineDash([6, 4]);
+    pen.beginPath();
+    for (const value of at) {
+      const place = (across ? y : x).place(value);
+      pen.moveTo(across ? box.left : place, across ? place : box.top);
+      pen.lineTo(across ? box.right : place, across ? place : box.bottom);
+    }
+    pen.stroke();
+    pen.setLineDash([]);
+  },
   stems(pen, { xs, ys }, x, y) {
     pen.lineWidth = 1.2;
     for (let place = 0; place < xs.length; place++) {
@@ -49,7 +68,8 @@ const DRAWN = {
     }
   },
   /** Each place has the colour of the nearest point: the first of two passes looks up and left, the second down and right. */
-  nearest(pen, { xs, ys, values, range }, x, y, box) {
+  nearest(pen, layer, x, y, box) {
+    const { xs, ys, values } = layer;
     const wide = Math.ceil((box.right - box.left) / GRAIN), tall = Math.ceil((box.bottom - box.top) / GRAIN);
     const across = xs.map((value) => (x.place(value) - box.left) / GRAIN), up = ys.map((value) => (y.place(value) - box.top) / GRAIN);
     const owner = new Int32Array(wide * tall).fill(-1);
@@ -73,20 +93,26 @@ const DRAWN = {
     for (let cell = 0; cell < owner.length; cell++) {
       if (owner[cell] < 0) continue;
       const column = cell % wide;
-      pen.fillStyle = colourOf((values[owner[cell]] - range[0]) / (range[1] - range[0]));
+      pen.fillStyle = cellColour(layer, owner[cell]);
       pen.fillRect(box.left + column * GRAIN, box.top + ((cell - column) / wide) * GRAIN, GRAIN, GRAIN);
     }
   },
-  cells(pen, { xs, ys, values, range }, x, y) {
+  cells(pen, layer, x, y) {
+    const { xs, ys, values } = layer;
     const across = edgesOf(xs, x.logarithmic), up = edgesOf(ys, y.logarithmic);
     for (let place = 0; place < xs.length; place++) {
       if (values[place] === null) continue;
-      pen.fillStyle = colourOf((values[place] - range[0]) / (range[1] - range[0]));
+      pen.fillStyle = cellColour(layer, place);
       const [left, right] = across.get(xs[place]).map(x.place), [below, above] = up.get(ys[place]).map(y.place);
       pen.fillRect(left, above, right - left + 0.6, below - above + 0.6);
     }
   },
 };
+
+/** Return the colour of a cell of a map: that of its class, or of its value. */
+function cellColour({ values, colours, range }, place) {
+  return colours ? colours[values[place]] : colourOf((values[place] - range[0]) / (range[1] - range[0]));
+}
 
 /** Return of each value how far its cell reaches: half of the way to its neighbours. */
 function edgesOf(values, logarithmic) {

@@ -41,9 +41,9 @@ export class Plot {
   /** Show layers `{kind, xs, ys, colour, name}` over axes `{label, log}`; a map has `values`, `range` and `bar`. */
   show(content) {
     this.content = content;
-    const named = content.layers.filter((layer) => layer.name);
+    const named = content.layers.filter((layer) => layer.name), map = content.layers.find((layer) => layer.classes);
     this.legend.replaceChildren(...named.map((layer) =>
-      element("span", {}, element("span", { class: `key ${layer.colour}` }), layer.name)));
+      element("span", {}, element("span", { class: `key ${layer.colour}` }), layer.name)), ...(map ? namesOf(map) : []));
     for (const one of [this, ...this.beside]) one.draw();
   }
 
@@ -63,9 +63,11 @@ export class Plot {
   get extents() {
     const { layers, x, y } = this.content;
     const room = layers.some(isMap) ? 0 : 0.04;
-    const ys = layers.map((layer) => layer.ys);
+    const limits = layers.filter((layer) => layer.kind === "limits");
+    const ys = [...layers.map((layer) => layer.ys), ...limits.map(({ at, across }) => (across ? at : []))];
+    const xs = [...layers.map((layer) => layer.xs), ...limits.map(({ at, across }) => (across ? [] : at))];
     if (layers.some((layer) => layer.kind === "stems")) ys.push([0]);
-    return { x: extent(layers.map((layer) => layer.xs), room || 0.01, x.log), y: extent(ys, room || 0.01, y.log) };
+    return { x: extent(xs, room || 0.01, x.log), y: extent(ys, room || 0.01, y.log) };
   }
 
   /** Have the axes of other plots that show the same quantities, and be zoomed with them. */
@@ -83,7 +85,7 @@ export class Plot {
     const colour = (name) => style.getPropertyValue(name).trim();
     pen.scale(dense, dense);
     pen.font = '12px system-ui, "DejaVu Sans", sans-serif';
-    const map = this.content.layers.find(isMap);
+    const map = this.content.layers.find((layer) => isMap(layer) && !layer.classes);
     const { x, y } = this.ranges;
     const box = this.box = { left: 62, right: width - (map ? 96 : 12), top: 10, bottom: height - 42 };
     this.x = scaleOf(x[0], x[1], box.left, box.right, this.content.x.log);
@@ -264,7 +266,16 @@ export class Plot {
   }
 }
 
-const NAMES = { one: "--series-1", two: "--series-2", three: "--series-3", wrong: "--bad" };
+/** Return the legend of a map of classes; those that share a colour are one entry. */
+function namesOf({ classes, colours }) {
+  return [...new Set(colours)].map((colour) => {
+    const key = element("span", { class: "key" }), same = classes.filter((_, place) => colours[place] === colour);
+    key.style.backgroundColor = colour;
+    return element("span", {}, key, same.length > 1 ? `${same.length} others` : same[0]);
+  });
+}
+
+const NAMES = { one: "--series-1", two: "--series-2", three: "--series-3", wrong: "--bad", limit: "--text" };
 
 function line(pen, left, top, right, bottom) {
   pen.beginPath();

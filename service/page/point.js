@@ -2,6 +2,7 @@
 
 import { ask, campaignPath } from "./api.js";
 import { button, element, inTitle, inWords, short, table, tell } from "./dom.js";
+import { withGaps } from "./layers.js";
 import { Plot } from "./plot.js";
 
 const TABLE_ROWS = 200;
@@ -45,14 +46,16 @@ async function answered(id, run, wanted) {
 }
 
 function views(data) {
-  const { samples, impacts, periods } = data;
+  const { samples, impacts } = data;
   const quantity = (name, label = name.replaceAll("_", " ")) => inWords({ label, units: data.units[name] });
   const facts = { ...data.coordinates, outcome: data.outcome, direction: data.direction };
   const made = [element("dl", { class: "facts" }, Object.entries(facts).map(([key, value]) =>
     element("div", {}, element("dt", {}, inTitle(key)), element("dd", {}, typeof value === "number" ? short(value) : value))))];
-  if (data.message) made.push(element("p", { class: "small muted" }, data.message));
+  for (const words of [data.message, ...data.left_out]) {
+    if (words) made.push(element("p", { class: "small muted" }, words));
+  }
   const grid = element("div", { class: "sides" });
-  if (samples.time?.length) grid.append(seriesPlot(samples, quantity), ...portraitPlot(samples, periods, quantity));
+  if (samples.time?.length) grid.append(seriesPlot(data, quantity), ...portraitPlot(data, quantity));
   else made.push(element("p", { class: "muted" }, "There is no motion in time of this point."));
   if (impacts.impact_time?.length) grid.append(impactPlot(impacts, quantity));
   if (grid.children.length === 3) grid.firstChild.classList.add("wide");
@@ -65,14 +68,23 @@ function panel(title, plot) {
   return element("section", { "aria-label": title }, element("h3", { class: "small" }, title), plot.node);
 }
 
-function seriesPlot(samples, quantity) {
+/** Return the stops of a displacement as a layer, horizontal ones or upright ones. */
+function stopsOf({ stops }, name, across) {
+  return stops[name] ? [{ kind: "limits", colour: "limit", name: stops[name].length > 1 ? "stops" : "stop", at: stops[name], across, xs: [], ys: [] }] : [];
+}
+
+function seriesPlot(data, quantity) {
+  const { samples } = data;
   const names = Object.keys(samples).filter((name) => name !== "time");
   let chosen = names[0];
   const plot = new Plot("Motion in time", { height: 280 });
-  const draw = () => plot.show({
-    layers: [{ kind: "line", readable: true, colour: "one", xs: samples.time, ys: samples[chosen] }],
-    x: { label: quantity("time") }, y: { label: quantity(chosen) },
-  });
+  const draw = () => {
+    const [xs, ys] = withGaps([samples.time, samples[chosen]], samples.time, data.impacts.impact_time);
+    plot.show({
+      layers: [{ kind: "line", readable: true, colour: "one", xs, ys }, ...stopsOf(data, chosen, true)],
+      x: { label: quantity("time") }, y: { label: quantity(chosen) },
+    });
+  };
   const made = panel("Motion in time", plot);
   if (names.length > 1) {
     const select = element("select", { "aria-label": "Variable over time", onchange: () => { chosen = select.value; plot.view = null; draw(); } },
@@ -83,11 +95,13 @@ function seriesPlot(samples, quantity) {
   return made;
 }
 
-function portraitPlot(samples, periods, quantity) {
+function portraitPlot(data, quantity) {
+  const { samples, periods } = data;
   const velocity = Object.keys(samples).find((name) => name === "velocity" || name.endsWith(".velocity"));
   const displacement = velocity?.replace(/velocity$/, "displacement");
   if (!velocity || !samples[displacement]) return [];
-  const layers = [{ kind: "line", readable: true, colour: "one", name: "orbit", xs: samples[displacement], ys: samples[velocity] }];
+  const [xs, ys] = withGaps([samples[displacement], samples[velocity]], samples.time, data.impacts.impact_time);
+  const layers = [{ kind: "line", readable: true, colour: "one", name: "orbit", xs, ys }, ...stopsOf(data, displacement, false)];
   if (periods.strobe_velocity) {
     layers.push({ kind: "points", size: 5, colour: "two", name: "once a period", xs: periods.strobe_displacement, ys: periods.strobe_velocity });
   }
@@ -110,7 +124,8 @@ function impactTable(impacts, quantity) {
   if (!count) return element("p", { class: "muted" }, "No impacts in what is shown.");
   const names = Object.keys(IMPACT).filter((name) => impacts[name]);
   const rows = impacts.impact_time.slice(0, TABLE_ROWS).map((_, place) => names.map((name) => impacts[name][place]));
-  return element("details", {}, element("summary", {}, `${count} impacts, as a table`),
+  const which = count > TABLE_ROWS ? `The first ${TABLE_ROWS} of ${count} impacts` : `${count} impacts`;
+  return element("details", {}, element("summary", {}, `${which}, as a table`),
     element("div", { class: "scroll tall", tabindex: "0", role: "region", "aria-label": "Impacts as a table" },
       table("Impacts", names.map((name) => quantity(name, IMPACT[name])), rows)));
 }

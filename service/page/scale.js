@@ -56,3 +56,13 @@ export function colourOf(share) {
   const [red, green, blue] = STOPS[low].map((one, channel) => Math.round(one + rest * (STOPS[low + 1][channel] - one)));
   return `rgb(${red},${green},${blue})`;
 }
+
+const CLASSES = ["#0F4C81", "#56A5DC", "#3C7D3C", "#9BC46B", "#7A4B9A", "#C79BD6", "#8A6D00", "#E0B53A"];
+const OWN = { "no impacts": "#D9D9D9", chaos: "#B5410B", rest: "#8C8C8C", unknown: "#595959" };
+const OTHER = "#000000"; // of classes that are too many to be told apart
+
+/** Return a colour for each class of motions, as the figures of `plot` have them: the first ones have one of their own. */
+export function coloursOf(classes) {
+  const orbits = classes.filter((name) => !OWN[name]).slice(0, CLASSES.length).sort();
+  return classes.map((name) => OWN[name] ?? CLASSES[orbits.indexOf(name)] ?? OTHER);
+}

@@ -25,6 +25,7 @@ MAP = sweep_text(6, 20) + (
 )
 """18 points, of which 4 have too many impacts: of the stop that is at 0."""
 POINT = re.compile("^Point [0-9]+$")
+CLASS_NAME = re.compile(r"P\(|chaos|unknown|no impacts")
 WRONG = "[body]\nstiffness = 1\nmass = -1\n[record]\nrecorded_time = 5\n"
 DROP = """([selector, files]) => {
   const dropped = new DataTransfer();
@@ -145,6 +146,26 @@ def test_a_click_on_a_map_shows_its_point_and_a_drag_zooms(seen: PageSession, jo
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 330, steps=3)
     page.mouse.up()
     page.locator('canvas[data-points="3"]').wait_for()
+
+
+def test_a_map_of_classes_names_them_and_a_point_shows_its_stop(seen: PageSession, jobs: Jobs) -> None:
+    page = seen.show_job(jobs.map)
+    assert drawn(page) == 18
+    page.get_by_label("Variable", exact=True).select_option("class")
+    page.get_by_text("class of the motion: 18 of 18 points.").wait_for()
+    legend = page.locator(".legend").first
+    legend.get_by_text(CLASS_NAME).first.wait_for()
+    assert violations(page) == []
+    canvas = page.locator("canvas").first
+    canvas.focus()
+    page.keyboard.press("ArrowRight")
+    assert CLASS_NAME.search(page.locator(".tip").first.inner_text())
+    page.keyboard.press("Enter")
+    portrait = page.get_by_role("region", name="Phase portrait")
+    portrait.locator(".legend").get_by_text("stop").wait_for()
+    # a line has a gap before the first sample from an impact on
+    gaps = """async () => (await import('/page/layers.js')).withGaps([[5, 6, 7]], [0, 1, 2], [0.5, 0.7, 2.5, -1])"""
+    assert page.evaluate(gaps) == [[5, None, 6, 7]]
 
 
 def test_a_point_that_is_chosen_by_keys_shows_its_motion(seen: PageSession, jobs: Jobs) -> None:

@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ from support.dataset_examples import CONNECTIONS, coupled_dataset, coupled_recor
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Direction, RunRecord, file_names, merge_datasets, write_dataset
+from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 
 Lengths = st.lists(st.tuples(*(st.integers(0, 4),) * 3), min_size=1, max_size=8)
 
@@ -105,6 +107,48 @@ def test_events_and_residuals_of_parts_in_any_order_come_back_run_by_run(
                 np.testing.assert_array_equal(np.column_stack(columns), run.events)
                 residual = shuffled.energy_residual.sel(mass=k, connection=CONNECTIONS)
                 np.testing.assert_array_equal(residual, run.energy_residual)
+
+
+Together = st.integers(1, 3).flatmap(
+    lambda keys: st.lists(
+        st.tuples(*(st.sampled_from([-2.0, 0.25, 0.5, 8.0]),) * keys), min_size=1, max_size=6, unique=True
+    )
+)
+
+
+@settings(max_examples=20)
+@given(Together, st.sampled_from(["size", "draw"]), st.integers(1, 2), st.booleans())
+def test_points_of_keys_that_move_together_are_selected_by_their_axis(
+    points: list[tuple[float, ...]], dimension: str, frequencies: int, saved: bool
+) -> None:
+    names = [f"stop_{key}_position" for key in range(1, 1 + len(points[0]))]
+    columns = np.repeat(np.array(points).T, frequencies, axis=1)
+    coordinates = dict(zip(names, columns, strict=True))
+    coordinates["angular_frequency"] = np.tile(np.arange(float(frequencies)), len(points))
+    dataset = dataset_of(
+        [record(float(k)) for k in range(columns.shape[1])],
+        coordinates=coordinates,
+        unit_of=dict.fromkeys(names, "m"),
+    )
+    for name in names:
+        dataset[name].attrs[SWEPT_ALONG] = dimension
+    with tempfile.TemporaryDirectory() as folder:
+        write_dataset(dataset, Path(folder, "runs.nc"))
+        with open_dataset(Path(folder, "runs.nc")) as opened:
+            # version 0.2 saved what it had opened without the axis
+            opened.drop_vars(dimension).to_netcdf(Path(folder, "again.nc"))
+        with open_dataset(Path(folder, "again.nc" if saved else "runs.nc")) as opened:
+            values = [name for name in names if len(set(opened[name].values)) == len(points)]
+            numbered = not values or (dimension == "draw" and len(names) > 1)
+            axis = range(len(points)) if numbered else opened[values[0]].values
+            assert opened[dimension].values.tolist() == list(axis)
+            for place, value in enumerate(axis):
+                chosen = opened.sel({dimension: value})
+                assert chosen.displacement_range.equals(opened.displacement_range.isel({dimension: place}))
+                point = {dimension: value, "angular_frequency": frequencies - 1.0}
+                assert opened.vibroimpact.impacts(**point, exact=True)[names[0]] == points[place][0]
+            with pytest.raises(KeyError, match="not all values found"):
+                opened.sel({dimension: 0.3})
 
 
 @given(st.lists(st.text("aA1_[.é", max_size=4), unique=True, max_size=12))

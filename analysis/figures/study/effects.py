@@ -18,7 +18,8 @@ _CONVERGENCE_MM = 45
 _WORDS = 0.55
 """Room for what is written beside the bars, over that of the bars."""
 _LONGEST = 28
-"""Letters of what is written beside a bar."""
+"""Letters in a line of what is written beside a bar."""
+_CLASSES = ("orbit", "orbit_without")
 
 
 def draw_effects(dataset: xr.Dataset) -> Figure:
@@ -55,11 +56,9 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
             axis = figure.subplots()
         axis.barh(places, 100.0 * dataset["share"].values, height=0.6, color=LINE, alpha=0.5)
         axis.plot(parts, np.broadcast_to(places[:, None], parts.shape), ".", color=MARK, markersize=2.5)
-        for place, words in zip(places, dataset["changes"].values, strict=True):
-            shown = str(words)
-            shown = shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."
+        for place, words in zip(places, _beside(dataset), strict=True):
             axis.text(
-                0.98, place, shown, fontsize=5, ha="right", va="center", transform=axis.get_yaxis_transform()
+                0.98, place, words, fontsize=5, ha="right", va="center", transform=axis.get_yaxis_transform()
             )
         axis.axvline(0.0, color="0.5", linewidth=0.6)
         axis.set_yticks(places, names, fontsize=6)
@@ -69,6 +68,23 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
         axis.set_xlabel("share of the time of a run (%)")
         figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8, wrap=True)
     return figure
+
+
+def _beside(dataset: xr.Dataset) -> list[str]:
+    """Return what is written beside each bar: what is otherwise without it, and below as a whole."""
+    found = []
+    for row, words in enumerate(dataset["changes"].values):
+        lines = [str(words)]
+        if "orbit" in dataset and (classes := [str(dataset[name].values[row]) for name in _CLASSES])[0]:
+            lines.append(" to ".join(dict.fromkeys(classes)))
+        if (
+            "displacement_range" in dataset
+            and np.isfinite(ends := dataset["displacement_range"].values[row]).all()
+        ):
+            lines.append(f"range {100.0 * (ends[1] / ends[0] - 1.0):+.3g} %" if ends[0] > 0.0 else "")
+        shown = (line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..." for line in lines if line)
+        found.append("\n".join(shown))
+    return found
 
 
 def _draw_convergence(axis: Axes, dataset: xr.Dataset) -> None:

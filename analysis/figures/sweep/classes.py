@@ -17,6 +17,7 @@ from vibroimpact.analysis.figures.sweep.diagrams import (
     edges,
     in_order_of_the_scene,
     is_logarithmic,
+    on_axes,
     varied,
     wrong_sweep,
 )
@@ -82,7 +83,7 @@ def _legend(figure: Figure, palette: dict[str, str]) -> None:
 
 
 def _draw_map(dataset: xr.Dataset, along: str, across: str) -> Figure:
-    names = xr.DataArray(_names(dataset), dims=dataset[KIND].dims)
+    names = dataset[KIND].copy(data=_names(dataset))
     palette = _palette(names.values)
     places = {name: number for number, name in enumerate(palette)}
     directions = np.atleast_1d(dataset["direction"].values).tolist()
@@ -90,23 +91,24 @@ def _draw_map(dataset: xr.Dataset, along: str, across: str) -> Figure:
     axes = np.atleast_1d(figure.subplots(len(directions), 1, sharex=True))
     for axis, place in zip(axes, range(len(directions)), strict=True):
         one = names.isel(direction=place) if "direction" in names.dims else names
-        rows = one.squeeze().transpose(across, along).values
+        cells = on_axes(one.squeeze(), along, across)
+        y, x = (cells[axis] for axis in cells.dims)
         numbers = np.vectorize(
             lambda name: places.get(name, places.get("other", np.nan)) if name else np.nan
-        )(rows)
+        )(cells.values)
         axis.pcolormesh(
-            edges(dataset[along].values),
-            edges(dataset[across].values),
+            edges(x.values),
+            edges(y.values),
             numbers.astype(float),
             cmap=ListedColormap(list(palette.values())),
             vmin=-0.5,
             vmax=len(palette) - 0.5,
             rasterized=True,
         )
-        axis.set_ylabel(label(dataset[across]))
+        axis.set_ylabel(label(y))
         if len(directions) > 1:
             axis.set_title(f"{directions[place]} sweep", fontsize=8)
-    axes[-1].set_xlabel(label(dataset[along]))
+    axes[-1].set_xlabel(label(x))
     _legend(figure, palette)
     return figure
 

@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from vibroimpact.analysis.dataset.schema import SWEPT_ALONG, scene_of, swept_names
+from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of, standing_for, swept_names
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
@@ -41,8 +41,6 @@ _WIDE = 8.0
 _WIDEST = 1e6
 # Cells of a map of scattered points along each axis.
 _CELLS = 500
-# Dimension of the runs of two adaptive axes.
-_SCATTERED = "point"
 _NEITHER = (
     "figure: expected extrema or impacts in the dataset, got neither. "
     "Set extrema = true or impacts = true in [record]."
@@ -50,14 +48,35 @@ _NEITHER = (
 
 
 def varied(dataset: xr.Dataset) -> list[str]:
-    """Return the swept parameters that take more than one value; of those that move together the first."""
-    names = [name for name in swept_names(dataset) if dataset[name].size > 1]
-    first: dict[str, str] = {}
-    for name in names:
+    """Return the swept parameters that take more than one value; one stands for those that move together."""
+    together: dict[str, list[str]] = {}
+    for name in swept_names(dataset):
         along = dataset[name].attrs.get(SWEPT_ALONG, name)
-        # points that are no grid stand for two parameters
-        first.setdefault(name if along == _SCATTERED else along, name)
-    return list(first.values())
+        if dataset[name].size > 1:
+            # points that are no grid stand for two parameters
+            together.setdefault(name if along == SCATTERED else along, []).append(name)
+    return [_standing_for(dataset, along, names) or names[0] for along, names in together.items()]
+
+
+def _standing_for(dataset: xr.Dataset, along: str, names: list[str]) -> str | None:
+    return standing_for(along, {name: dataset[name].values for name in names})
+
+
+def on_axes(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
+    """Return values over two swept parameters, shape (across, along), both ascending.
+
+    The axis of parameters that move together is the one that stands for all. Where none does, it is their place.
+    """
+    axes = []
+    for name in (across, along):
+        dimension = str(values[name].dims[0])
+        if np.array_equal(values.get_index(dimension), values[name].values):
+            values = values.swap_dims({dimension: name})
+            axes.append(name)
+        else:
+            axes.append(f"place along {dimension}")
+            values = values.rename({dimension: axes[-1]})
+    return values.transpose(*axes).sortby(axes)
 
 
 def in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
@@ -250,7 +269,7 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
     if len(varied(dataset)) != 2:
         raise DatasetError(wrong_sweep("two swept parameters", dataset))
     along, across = in_order_of_the_scene(dataset, varied(dataset))
-    if dataset["run_id"].dims == (_SCATTERED,):
+    if dataset["run_id"].dims == (SCATTERED,):
         quantities = [(_nearest(values, along, across), text, none) for values, text, none in quantities]
     elif "run" in dataset["run_id"].dims:
         raise DatasetError(
@@ -262,15 +281,11 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
     axes = np.asarray(
         figure.subplots(len(quantities), len(directions), sharex=True, sharey=True, squeeze=False)
     )
-    shared = {name: str(dataset[name].dims[0]) for name in (along, across) if name not in dataset.dims}
-    numbered = {name: along for name, along in shared.items() if along != _SCATTERED}
-    along, across = (numbered.get(name, name) for name in (along, across))
-    places = {name: _numbered(dataset, name) for name in numbered.values()}
     for row, (values, text, missing) in zip(axes, quantities, strict=True):
         for axis, direction in zip(row, directions, strict=True):
             branch = values.sel(direction=direction) if "direction" in values.dims else values
             notes = [f"{direction} sweep"] if len(directions) > 1 else []
-            branch = branch.squeeze().transpose(across, along).assign_coords(places)
+            branch = on_axes(branch.squeeze(), along, across)
             notes += _colours(axis, branch, text, values.values)
             notes += [] if np.isfinite(branch.values).all() else [f"gray: {missing}"]
             axis.set_title("; ".join(notes), fontsize=8 if len(notes) == 1 else 7)
@@ -291,12 +306,6 @@ def _nearest(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
         name: (name, axis, values[name].attrs) for name, axis in zip((along, across), grid, strict=True)
     }
     return xr.DataArray(values.values[place].reshape(_CELLS, _CELLS), coordinates, dims=(along, across))
-
-
-def _numbered(dataset: xr.Dataset, dimension: str) -> xr.DataArray:
-    """Return the places along a dimension that several parameters share, from 1: none of them may stand for all."""
-    described = {"long_name": f"place along {dimension}", "units": "1"}
-    return xr.DataArray(np.arange(1.0, dataset.sizes[dimension] + 1.0), dims=dimension, attrs=described)
 
 
 def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:

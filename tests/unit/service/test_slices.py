@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import vibroimpact as vi
+from vibroimpact.analysis.figures import largest_impact_velocity
+from vibroimpact.analysis.orbits.classify import classify
 from vibroimpact.orchestrator.campaign import run_campaign, run_scene
 from vibroimpact.service.landed import LandedReader, files_of
 from vibroimpact.service.page_api import examples_folder
@@ -33,6 +35,13 @@ recorded_periods = 6
 "stop[1].restitution" = { values = [0.6, 0.8] }
 "forcing.angular_frequency" = { start = 0.8, stop = 1.2, points = 20, path = "up-down" }
 """
+
+
+LOWER = """[[stop]]
+side = "lower"
+position = -1.5
+restitution = 0.7
+[record]"""
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +88,113 @@ def test_a_large_slice_is_thinned_evenly_and_a_map_has_no_gaps(file: Path) -> No
     found = slice_of(cells, Selection({}, {}), 20)
     grid = {(one, other) for one, other in zip(*found["coordinates"], strict=True)}
     assert len(grid) == len(set(found["coordinates"][0])) * len(set(found["coordinates"][1]))
+
+
+def test_a_thinned_map_says_how_many_points_it_leaves_out(file: Path) -> None:
+    landed = LandedReader().read([file], "displacement_range")
+    assert landed is not None
+    found = slice_of(landed, Selection({}, {}), 20)
+    assert (found["rows"], found["every"]) == (80, 2)
+    assert found["shown"] == len(found["value"]) == 1 * 10 * 2
+    assert slice_of(landed, Selection({}, {}), 80)["every"] == 1
+
+
+def test_a_map_can_be_of_what_plot_draws_maps_of(file: Path) -> None:
+    reader = LandedReader()
+    answers = {}
+    for name in ("largest_impact_velocity", "mean_impacts_per_period", "class"):
+        landed = reader.read([file], name)
+        assert landed is not None
+        answers[name] = slice_of(landed, Selection({}, {}), 5000)
+    with vi.open_dataset(file) as dataset:
+        largest = largest_impact_velocity(dataset)
+        mean = dataset["impacts_per_period"].mean("period")
+        expected = {
+            "largest_impact_velocity": largest,
+            "mean_impacts_per_period": mean.where(mean > 0.0),
+        }
+        for name, values in expected.items():
+            runs = dataset.assign(wanted=values).vibroimpact.runs["wanted"].values
+            found = np.array(answers[name]["value"], dtype=np.float64)
+            assert np.isfinite(found).any()
+            np.testing.assert_array_equal(found, runs)
+        names = [one.name for one in classify(dataset)]
+    told = answers["class"]
+    assert [told["classes"][int(place)] for place in told["value"]] == names
+    assert {"P(1,1)"} < set(names), "motions of several classes"
+    counts = [names.count(name) for name in told["classes"]]
+    assert counts == sorted(counts, reverse=True)
+    assert answers["largest_impact_velocity"]["classes"] == []
+
+
+def test_keys_that_move_together_are_one_axis_of_a_map(tmp_path: Path) -> None:
+    gap = """
+    "stop[1].position" = { values = [0.2, 0.4, 0.8], zip = "gap" }
+    "body.mass" = { values = [1.0, 1.1, 1.2], zip = "gap" }
+    """
+    text = SCENE.replace('"stop[1].restitution" = { values = [0.6, 0.8] }', gap).replace("up-down", "up")
+    run_scene(vi.Scene.from_text(text), tmp_path / "dataset.nc")
+    landed = LandedReader().read([tmp_path / "dataset.nc"], "displacement_range")
+    assert landed is not None
+    assert [(axis.name, axis.along) for axis in landed.axes] == [
+        ("position", "gap"),
+        ("mass", "gap"),
+        ("angular_frequency", ""),
+    ]
+    found = slice_of(landed, Selection({}, {}), 20)
+    assert (found["rows"], found["every"], found["shown"]) == (60, 2, 20)
+    # held at one of them there is one axis left, whose points are all drawn
+    assert slice_of(landed, Selection({"mass": 1.1}, {}), 30)["shown"] == 20
+
+
+def test_a_point_has_the_stops_that_limit_it_and_says_what_is_left_out(tmp_path: Path) -> None:
+    text = SCENE.replace("recorded_periods = 6", "recorded_periods = 30").replace("[record]", LOWER)
+    text = text[: text.index("[sweep]")] + '[sweep]\n"stop[1].position" = { values = [0.5, 0.7] }\n'
+    run_scene(vi.Scene.from_text(text), tmp_path / "dataset.nc")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    found = simulated(tmp_path / "scene.toml", tmp_path, 1)
+    assert found["stops"] == {"displacement": [0.7, -1.5]}
+    assert found["left_out"] == ["The first 20 of 30 recorded periods are shown."]
+
+
+@pytest.mark.parametrize(
+    ("body", "stops"),
+    [
+        ('kind = "chain"\nmasses = [1.0, 1.0]\nstiffnesses = [1.0, 1.0]', {"displacement[1]": [0.5]}),
+        (
+            'kind = "beam"\nmodes = 2\nlength = 1.0\nflexural_rigidity = 1.0\nmass_per_length = 1.0',
+            {"contact_displacement[1]": [0.5]},
+        ),
+    ],
+)
+def test_a_stop_limits_the_point_that_it_is_at(
+    tmp_path: Path, body: str, stops: dict[str, list[float]]
+) -> None:
+    (name,) = stops
+    place = "mass = 1" if "chain" in body else "location = 0.5"
+    text = f"""
+    [body]
+    {body}
+    damping_ratio = 0.1
+    [forcing]
+    amplitude = 0.5
+    angular_frequency = 1.0
+    [[stop]]
+    position = 0.5
+    restitution = 0.7
+    {place}
+    [record]
+    recorded_periods = 2
+    time_series = {{ rate = 10.0, variables = ["{name}"] }}
+    """
+    if "chain" in body:
+        text = text.replace("amplitude = 0.5", "amplitude = [0.5, 0.0]").replace("damping_ratio = 0.1", "")
+    run_scene(vi.Scene.from_text(text), tmp_path / "dataset.nc")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    found = simulated(tmp_path / "scene.toml", tmp_path / "dataset.nc", 0)["stops"]
+    assert found[name] == stops[name]
+    # the tip of the beam is observed, at which no stop is; of the chain the mass at its first stop
+    assert ("displacement" in found) == ("chain" in body)
 
 
 def test_parts_of_a_campaign_are_joined(file: Path) -> None:

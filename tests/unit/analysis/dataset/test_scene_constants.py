@@ -91,7 +91,7 @@ def test_a_number_with_the_name_of_a_dimension_has_another_name(tmp_path: Path) 
         dataset = opened(tmp_path, SCENE.format(position=0.1, sweep=sweep))
         assert dataset.displacement_range.dims == dataset.mass.dims == (dimension,)
         assert constants(dataset)[f"{dimension}_2"] == value
-        assert dimension not in dataset.coords
+        assert dataset[dimension].values.tolist() == [1.0, 2.0]
 
 
 def test_of_two_keys_for_one_thing_the_one_that_counts_is_there(tmp_path: Path) -> None:

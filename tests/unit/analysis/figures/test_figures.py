@@ -8,6 +8,8 @@ import pytest
 import typer
 import xarray as xr
 from matplotlib.figure import Figure
+from support.campaign_scenes import scene_of
+from support.command_line import in_this_process
 from support.dataset_examples import coupled_dataset, coupled_record, dataset_of, record, up_down
 from support.impact_sweep import SCENE, Oscillator
 from typer.testing import CliRunner
@@ -19,6 +21,7 @@ from vibroimpact.analysis.figures.scene_text import limits
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.campaign import run_scene
 
 PNG = b"\x89PNG\r\n"
 
@@ -211,6 +214,60 @@ def test_a_diagram_of_rounding_keeps_its_points_within_the_frame(tmp_path: Path)
         for line in axis.get_lines():
             assert np.max(line.get_ydata()) < 0.99 * axis.get_ylim()[1]
         assert axis.get_title(loc="left").startswith("one value, to 1e-09 of it: ")
+
+
+GAP = """
+[scene]
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+damping_ratio = 0.05
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.8
+[[stop]]
+position = 0.5
+restitution = 0.8
+[[stop]]
+side = "lower"
+position = -0.5
+restitution = 0.8
+[record]
+transient_periods = 50
+recorded_periods = 4
+[sweep]
+"forcing.angular_frequency" = { values = [0.5, 1.0, 1.5] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "axis", "edges"),
+    [
+        ([0.2, 0.8, 0.4], [-0.2, -0.8, -0.4], "stop 1 position (-)", [0.1, 0.3, 0.6, 1.0]),
+        ([0.2, 0.2, 0.4], [-0.2, -0.8, -0.4], "stop 2 position (-)", [-1.0, -0.6, -0.3, -0.1]),
+        ([0.2, 0.2, 0.4], [-0.2, -0.8, -0.8], "place along gap (-)", [-0.5, 0.5, 1.5, 2.5]),
+    ],
+)
+def test_a_map_of_keys_that_move_together_has_the_values_of_one_that_tells_its_points_apart(
+    tmp_path: Path, first: list[float], second: list[float], axis: str, edges: list[float]
+) -> None:
+    sweep = "".join(
+        f'"stop[{k}].position" = {{ values = {values}, zip = "gap" }}\n'
+        for k, values in ((1, first), (2, second))
+    )
+    run_scene(scene_of(GAP + sweep), tmp_path / "gap.nc")
+    in_this_process("classify", str(tmp_path / "gap.nc"), "-o", str(tmp_path / "classes.nc"))
+    with open_dataset(tmp_path / "classes.nc") as dataset:
+        for kind in ("map", "classes"):
+            panel = figures.draw(dataset, kind).axes[0]
+            (cells,) = panel.collections
+            assert panel.get_ylabel() == axis
+            np.testing.assert_allclose(cells.get_coordinates()[:, 0, 1], edges, atol=1e-12)
+        # the row of a value is that of its runs
+        (cells,) = figures.draw(dataset, "map").axes[0].collections
+        place = np.argsort(dataset.gap.values)
+        np.testing.assert_array_equal(cells.get_array(), dataset.displacement_range.values[:, place].T)
 
 
 @pytest.mark.parametrize(

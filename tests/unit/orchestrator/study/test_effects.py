@@ -14,6 +14,9 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.effects import effects_of, not_called, shares_of
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
+from vibroimpact.orchestrator.study.motion import changes_of_motion, sampling_of_change
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.statistics import statistics_of
 
 BEAM: dict[str, Any] = {
     "body": {"kind": "beam", "modes": 4, "length": 0.3, "flexural_rigidity": 0.18, "mass_per_length": 0.16}
@@ -67,6 +70,77 @@ def test_what_is_kept_changes_no_motion_and_what_moves_does(monkeypatch: pytest.
     assert shares["time series"].change == 0.0
     assert shares["restitution stop"].changes.startswith("loses ")
     assert all(share.seconds.shape == (2,) for share in shares.values())
+
+
+LINEAR: dict[str, Any] = {
+    "scene": {"units": "nondimensional"},
+    "body": {"mass": 2.0, "stiffness": 2.0, "damping_ratio": 0.1},
+    "forcing": {"amplitude": 1.0, "angular_frequency": 0.8},
+    "stop": [{"position": 0.1, "restitution": 0.8}],
+    "record": {"transient_periods": 200, "recorded_periods": 10},
+}
+
+
+def test_where_impacts_are_lost_the_motions_are_told_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    stop_the_clock(monkeypatch)
+    found = vi.effects(LINEAR)
+    (row,) = np.flatnonzero(found["asked_by"].values == "stop[1]")
+    # without the stop the body is linear: x = A sin, its kinetic energy m (A w)^2 / 4 in the mean
+    rate = 0.8
+    size = 1.0 / (2.0 * np.hypot(1.0 - rate**2, 2.0 * 0.1 * rate))
+    assert found["displacement_range"].values[row, 1] == pytest.approx(2.0 * size, rel=1e-6)
+    assert found["kinetic_energy"].values[row, 1] == pytest.approx(0.5 * (size * rate) ** 2, rel=1e-6)
+    assert found["potential_energy"].values[row, 1] == pytest.approx(0.5 * size**2, rel=1e-6)
+    assert found["impacts"].values[row].tolist() == [20, 0]
+    run = vi.run(LINEAR, progress=False)
+    assert found["displacement_range"].values[row, 0] == pytest.approx(
+        float(run.displacement_range), rel=1e-9
+    )
+    speed = float(run.impact_velocity.mean())
+    assert found["impact_velocity"].values[row, 0] == pytest.approx(speed, rel=1e-9)
+    assert (found["orbit"].values[row], found["orbit_without"].values[row]) == ("P(2,1)", "no impacts")
+    assert np.isnan(found["change"].values[row])
+    assert found["changes"].values[row] == "loses 20 of 20 impacts"
+    assert found["statistics"].values[row].startswith("P(2,1) to no impacts, displacement range +")
+    # what can be compared impact by impact is
+    (damping,) = np.flatnonzero(found["name"].values == "damping")
+    assert found["changes"].values[damping].startswith("up to ")
+    assert found["statistics"].values[damping] == ""
+
+
+def test_a_chaotic_motion_is_told_by_statistics_and_by_what_chance_makes_of_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stop_the_clock(monkeypatch)
+    scene = Scene.from_dict(
+        LINEAR
+        | {
+            "forcing": {"amplitude": 1.0, "angular_frequency": 2.8},
+            "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.02, "damping_slope": 1e-12},
+            "stop": [{"position": 0.0, "restitution": 0.8}],
+            "record": {"transient_periods": 100, "recorded_periods": 1000},
+        }
+    )
+    effects = [one for one in effects_of(scene) if one.asked_by in ("body.damping_slope", "stop[1]")]
+    shares = {share.effect.asked_by: share for share in shares_of(scene, effects)}
+    slight, stop = shares["body.damping_slope"], shares["stop[1]"]
+    assert slight.motions is not None
+    assert slight.motions[0].orbit == slight.motions[1].orbit == "chaotic"
+    assert np.isnan(slight.change)
+    changes, chance = changes_of_motion(*slight.motions), sampling_of_change(*slight.motions)
+    for name, change in changes.items():
+        assert 0.0 < abs(change) < 3.0 * chance[name], name
+    assert stop.motions is not None
+    assert stop.motions[1].orbit == "no impacts"
+    off = changes_of_motion(*stop.motions)["kinetic_energy"]
+    assert abs(off) > 3.0 * sampling_of_change(*stop.motions)["kinetic_energy"]
+    assert "(by chance " in slight.statistics_in_words
+
+
+def test_a_motion_without_impacts_has_no_statistics_of_impacts() -> None:
+    train = np.column_stack([np.arange(30.0), np.ones(30), np.ones(30)])
+    samples = np.ones((40, 1))
+    assert statistics_of(Observation(samples=samples), Observation(train, samples=samples), ()) is None
 
 
 def test_a_dataset_that_has_no_place_is_refused_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:

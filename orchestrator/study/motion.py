@@ -1,0 +1,222 @@
+"""What a motion is as a whole, where its impacts cannot be compared one by one: range, speeds, energies, class."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.dataset.results import Row, Rows
+from vibroimpact.analysis.dataset.schema import UnitSystem, unit_in
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sampled_names import CONSERVATIVE
+from vibroimpact.orchestrator.study.errors import Scales, errors_of
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.orbits import orbit_of
+from vibroimpact.orchestrator.study.references import CHAOTIC, disturbed_scenes, observed, scales_of
+from vibroimpact.orchestrator.study.statistics import Statistics
+
+QUANTITIES = {
+    "displacement_range": "m",
+    "impact_velocity": "m s-1",
+    "kinetic_energy": "J",
+    "potential_energy": "J",
+}
+"""What a motion is told by, with its SI unit; the last three are means over the recording."""
+REPLICATES = 6
+"""Runs from slightly different numbers, that tell chaos and the sampling error of its statistics."""
+SAMPLES_A_PERIOD, MOST_SAMPLES = 256, 2**16
+"""Samples of the energies in a forcing period, and over a run; an unforced run has the latter over 16."""
+CHAOS = "chaotic"
+"""The class of a motion that a small change of a number takes to another one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What one run showed as a whole.
+
+    Attributes
+    ----------
+    of : mapping of str to float
+        By quantity: m, m/s, J, J; NaN where it is not known, as the velocity of no impacts is.
+    impacts : int
+        How many were recorded.
+    orbit : str
+        `P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it.
+    sampling : mapping of str to float
+        By quantity, the largest relative difference among runs from slightly different numbers; empty without chaos.
+    """
+
+    of: Mapping[str, float]
+    impacts: int
+    orbit: str
+    sampling: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def chaotic(self) -> bool:
+        """Whether a small change of a number leads to another motion."""
+        return bool(self.sampling)
+
+
+def motion_of(scene: Scene) -> Motion | None:
+    """Run a scene of the short form or a replay and return what its motion is as a whole; None where it fails.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep. Of a replay the impacts alone are known.
+    """
+    followed, scales = _followed(scene), scales_of(scene)
+    found = observed(followed)
+    if found.failure:
+        return None
+    orbit = orbit_of(found, None if scene.replay else scene.period, scales.window)
+    own = Motion(_quantities(found, scene), len(found.impacts), orbit)
+    if orbit.startswith("P(") or not len(found.impacts):
+        return own
+    replicates = [observed(one) for one in disturbed_scenes(followed, REPLICATES)]
+    if not is_chaotic(found, replicates, scales):
+        return own
+    known = [_quantities(one, scene) for one in replicates if not one.failure]
+    sampling = {
+        name: max((abs(_relative(one[name], own.of[name])) for one in known), default=math.nan)
+        for name in QUANTITIES
+    }
+    return replace(own, orbit=CHAOS, sampling=sampling)
+
+
+def is_chaotic(found: Observation, replicates: Sequence[Observation], scales: Scales) -> bool:
+    """Whether runs from slightly different numbers come to another motion, as `accuracy` tells it."""
+    # of a body its impacts and its end: what jumps at an impact may be sampled on either side of it
+    own = replace(found, samples=None) if len(found.impacts) else found
+    for one in replicates:
+        errors = errors_of(replace(one, samples=None) if len(found.impacts) else one, own, scales)
+        if errors.failure or errors.worst() > CHAOTIC:
+            return True
+    return False
+
+
+def changes_of_motion(full: Motion, without: Motion) -> dict[str, float]:
+    """Return the relative change of each quantity from one motion to another; NaN where one of them has none."""
+    return {name: _relative(without.of[name], full.of[name]) for name in QUANTITIES}
+
+
+def sampling_of_change(full: Motion, without: Motion) -> dict[str, float]:
+    """Return how far chance alone takes each of these changes, relative to the first motion; 0 without chaos."""
+    found = {}
+    for name in QUANTITIES:
+        ratio = 1.0 + _relative(without.of[name], full.of[name])
+        own, other = (one.sampling.get(name, 0.0) for one in (full, without))
+        found[name] = own + (other * ratio if other else 0.0)
+    return found
+
+
+def _relative(value: float, base: float) -> float:
+    return value / base - 1.0 if base > 0.0 else (0.0 if value == base else math.nan)
+
+
+def _followed(scene: Scene) -> Scene:
+    """Return a scene that records its impacts, its extremes, and a time series of its energies; a replay as it is."""
+    if scene.replay is not None:
+        return scene
+    begin, end = scales_of(scene).window
+    count = MOST_SAMPLES / 16.0
+    if scene.period is not None:
+        count = min(SAMPLES_A_PERIOD * round((end - begin) / scene.period), MOST_SAMPLES)
+    series: dict[str, Any] = {"variables": ["displacement", *CONSERVATIVE]}
+    if scene.daq is None:  # else its rate is that of the converter
+        series["rate"] = count / (end - begin)
+    changes: dict[str, Any] = {"record.impacts": True, "record.time_series": series}
+    return scene.with_values(changes | ({} if scene.period is None else {"record.extrema": True}))
+
+
+def _quantities(found: Observation, scene: Scene) -> dict[str, float]:
+    is_followed = found.samples is not None and scene.replay is None
+    samples = found.samples if is_followed and found.samples is not None else np.empty((0, 3))
+    # the last sample of whole periods is the first one again
+    means = samples[:-1, 1:].mean(axis=0).tolist() if len(samples) > 1 else [math.nan, math.nan]
+    span = found.displacement_range
+    if math.isnan(span) and len(samples):  # nothing forces it: it has no extremes of periods
+        span = float(np.ptp(samples[:, 0]))
+    speed = float(np.abs(found.impacts[:, 1]).mean()) if len(found.impacts) else math.nan
+    return dict(zip(QUANTITIES, (span, speed, *means), strict=True))
+
+
+def motions_in_words(motions: tuple[Motion, Motion] | None, statistics: Statistics | None) -> str:
+    """Return what is otherwise in the second motion; empty where nothing is known.
+
+    Examples
+    --------
+    >>> full, without = (Motion(dict.fromkeys(QUANTITIES, size), 4, f"P({n},2)") for n, size in ((2, 2.0), (1, 3.0)))
+    >>> motions_in_words((full, without), None).split(", displacement")
+    ['P(2,2) to P(1,2)', ' range +50 %, impact velocity +50 %, kinetic energy +50 %, potential energy +50 %']
+    """
+    words = []
+    if motions is not None:
+        full, without = motions
+        classes = dict.fromkeys(one.orbit for one in motions if one.orbit)
+        words += [" to ".join(classes)] if classes else []
+        sampling = sampling_of_change(full, without)
+        for name, change in changes_of_motion(full, without).items():
+            if not math.isnan(change):
+                words.append(f"{name.replace('_', ' ')} {change_in_words(change, sampling[name])}")
+    if statistics is not None:
+        distance, chance = statistics.distribution_distance, statistics.distribution_sampling
+        by_chance = "" if math.isnan(chance) else f" (by chance {chance:.2g})"
+        words.append(f"distributions up to {distance:.2g} apart{by_chance}")
+    return ", ".join(words)
+
+
+def change_in_words(change: float, sampling: float) -> str:
+    """Return a relative change in percent, and what chance alone makes of it where it does.
+
+    >>> change_in_words(-0.25, 0.0), change_in_words(0.031, 0.05)
+    ('-25 %', '+3.1 % (by chance 5 %)')
+    """
+    by_chance = f" (by chance {100.0 * sampling:.2g} %)" if sampling > 0.0 else ""
+    return f"{100.0 * change:+.3g} %{by_chance}"
+
+
+def rows_of_motions(
+    motions: Sequence[tuple[Motion, Motion] | None],
+    statistics: Sequence[Statistics | None],
+    system: UnitSystem,
+) -> Rows:
+    """Return the variables of a dataset of effects that say what motions are as a whole, with it and without it.
+
+    Parameters
+    ----------
+    motions, statistics : sequence, shape (effect,)
+    system : {"SI", "nondimensional"}
+    """
+    none = Motion(dict.fromkeys(QUANTITIES, math.nan), -1, "")
+    pairs = [pair or (none, none) for pair in motions]
+    rows: dict[str, Row] = {}
+    for name, unit in QUANTITIES.items():
+        words = name.replace("_", " ")
+        said = f"{words}, with the effect and without it"
+        values = [[one.of[name] for one in pair] for pair in pairs]
+        chance = [sampling_of_change(*pair)[name] for pair in pairs]
+        rows[name] = (("effect", "motion"), np.reshape(values, (-1, 2)), unit_in(system, unit), said)
+        rows[f"{name}_sampling"] = ("effect", chance, "1", f"change of the {words} by chance alone, relative")
+    counts = np.reshape([[one.impacts for one in pair] for pair in pairs], (-1, 2))
+    rows["impacts"] = (("effect", "motion"), counts, "1", "impacts, with the effect and without it")
+    missing = Statistics(math.nan, math.nan, math.nan, math.nan)
+    known = [one or missing for one in statistics]
+    return rows | {
+        "distribution_distance": (
+            "effect",
+            [one.distribution_distance for one in known],
+            "1",
+            "distance between the distributions of impact velocity, or of what is sampled, the largest",
+        ),
+        "distribution_sampling": (
+            "effect",
+            [one.distribution_sampling for one in known],
+            "1",
+            "distance that chance alone makes",
+        ),
+    }

@@ -1,0 +1,67 @@
+"""The class of each run of an open file, as a number that is kept beside other variables, and its name."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
+from vibroimpact.analysis.dataset.schema import OrbitClass, Outcome
+
+STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
+_KINDS, _MOST_IMPACTS = 16, 2**24
+"""Numbers of kinds of classes, and of impacts of an orbit, that a code has room for."""
+_MOST_WORK, _EACH = 3e7, 200
+"""Runs times (periods^2 + 200) above which classes are not told: measured, 10 s where all runs are aperiodic."""
+
+
+def can_be_classified(file: netCDF4.Dataset) -> bool:
+    """Whether a file has values of each period that tell the class of a run, and is not too large for it."""
+    columns = _columns(file)
+    if columns and file.dimensions["run"].size * (file[columns[0]].shape[1] ** 2 + _EACH) > _MOST_WORK:
+        return False
+    return bool(columns) and all(file[name].long_name != OF_ALL_PERIODS.get(name, "") for name in columns)
+
+
+def codes_of(file: netCDF4.Dataset) -> NDArray[np.float64]:
+    """Return the class of each run of a file as a number, shape (run,)."""
+    from vibroimpact.analysis.orbits.classify import class_of  # xarray takes half a second to load
+
+    states = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in _columns(file)], axis=-1)
+    counts = file["impacts_per_period"][:] if "impacts_per_period" in file.variables else None
+    sticks = file["stick_count"][:] if "stick_count" in file.variables else np.zeros(len(states))
+    outcomes = file["outcome"][:]
+    found = np.empty(len(states))
+    for run, own in enumerate(states):
+        impacts = None if counts is None else counts[run]
+        one = class_of(own, impacts, Outcome(int(outcomes[run])), bool(sticks[run] > 0))
+        found[run] = int(one.kind) + _KINDS * ((one.impacts + 1) + _MOST_IMPACTS * one.periods)
+    return found
+
+
+def named_classes(codes: NDArray[np.float64]) -> tuple[list[str], NDArray[np.float64]]:
+    """Return the names of the classes that occur, the commonest first, and the place of each code among them."""
+    distinct, owner = np.unique(codes, return_inverse=True)
+    names = [_name(int(code)) for code in distinct]
+    counts: Counter[str] = Counter()
+    for name, count in zip(names, np.bincount(owner, minlength=len(names)), strict=True):
+        counts[name] += int(count)
+    classes = [name for name, _ in counts.most_common()]
+    places = np.array([classes.index(name) for name in names], dtype=np.float64)
+    return classes, places[owner]
+
+
+def _name(code: int) -> str:
+    from vibroimpact.analysis.orbits.classify import RunClass
+
+    rest, kind = divmod(code, _KINDS)
+    periods, impacts = divmod(rest, _MOST_IMPACTS)
+    return RunClass(OrbitClass(kind), impacts - 1, periods).name
+
+
+def _columns(file: netCDF4.Dataset) -> list[Any]:
+    return [name for name in STATES if name in file.variables]
