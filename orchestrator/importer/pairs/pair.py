@@ -74,6 +74,8 @@ class Pair:
         Steps may have to be repeated: always.
     restitution : float
         Coefficient of restitution.
+    begins_pressed : bool
+        The step under way is the first, and a contact that yields begins with it.
     """
 
     active = True
@@ -126,7 +128,7 @@ class Pair:
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
-        self.arrived = self.closed = self._pressed = False
+        self.arrived = self.closed = self._pressed = self.begins_pressed = False
         gap = self.look().gap
         if not gap >= -self._scale.room(time) and not self.yields:
             raise ComponentError(
@@ -168,6 +170,7 @@ class Pair:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
+        is_first, self.begins_pressed = self._is_new, False
         if self._is_new and not self._pulses.under_way:
             self._ask_bodies(time, target - time)
         start, self._time = self.look(), time
@@ -183,6 +186,7 @@ class Pair:
         self.closed = self._force.resting
         if self.yields:
             self.closed = self._touches(start)
+            self.begins_pressed = is_first and self.closed
         self._steps = steps
         target = min(target, time + self._longest)
         if not self.closed:
