@@ -149,8 +149,8 @@ class ContactBonds:
         return [*(bond.body for bond in self._held if bond.arrived), *met]
 
     def remarks(self) -> list[str]:
-        """What a reader of the results must know of held forces."""
-        return [text for text in (bond.remark() for bond in self.held) if text]
+        """What a reader of the results must know of held forces, and of bodies at rest on each other."""
+        return [text for text in (bond.remark() for bond in (*self.held, *self.pairs.pairs)) if text]
 
     def free(self) -> None:
         """Give back what they have saved."""

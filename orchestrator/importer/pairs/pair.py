@@ -57,6 +57,8 @@ LOW = 64.0
 #: pressed together.
 SMALL = 1e-3
 MOST_SMALL_BOUNCES = 1000
+#: Distance of bodies at rest on each other that a reader is told of, relative to the largest displacement.
+TOLD_DISTANCE = 1e-9
 #: A step longer than its limit by more than this factor, as its end shows, is made shorter.
 SLACK = 1.5
 
@@ -128,6 +130,7 @@ class Pair:
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
+        self._overlap = self._opening = 0.0  # of bodies at rest, m
         self.arrived = self.closed = self._pressed = self.begins_pressed = False
         gap = self.look().gap
         if not gap >= -self._scale.room(time) and not self.yields:
@@ -271,8 +274,18 @@ class Pair:
         deep = DEEP * self._scale.displacement + self._room
         if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
+        if self.rests:
+            gap = self.look().gap + self._surface
+            self._overlap, self._opening = max(self._overlap, -gap), max(self._opening, gap)
         met = abs(end - self._agreed) <= precision_at(end) or self._touches(self.look())
         self.arrived = self.yields and not self.closed and met
+
+    def remark(self) -> str:
+        """Return what a reader of the results must know of bodies at rest; empty where there is nothing."""
+        if not max(self._overlap, self._opening) > TOLD_DISTANCE * self._scale.displacement:
+            return ""
+        told = f"overlap by up to {self._overlap:.2g} m and part by up to {self._opening:.2g} m"
+        return f"{self.name}: bodies at rest on each other {told}. Use a shorter macro_step"
 
     def _touches(self, now: Motion) -> bool:
         return now.gap < -self._room or (now.gap <= self._room and now.closing > 0.0)
