@@ -261,9 +261,11 @@ class RecordedBody(ABC):
         """Return the sticks so far by their start, shape (n, 3): start, end (NaN: not ended), contact."""
         self.take_rows()
         ended = self.rows.of_kind(ROW_STICK)[:, :3]
-        is_open = () if self._open is None else self._open.get()
+        of_recording: list[bool] = [] if self._open is None else self._open.get().tolist()
         still = [
-            (start, np.nan, float(contact)) for contact, start in self.sticks_open() if is_open[contact - 1]
+            (start, np.nan, float(contact))
+            for contact, start in self.sticks_open()
+            if of_recording[contact - 1]
         ]
         return in_time_order(np.concatenate([ended, np.array(still).reshape(-1, 3)]))
 

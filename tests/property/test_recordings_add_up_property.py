@@ -32,8 +32,9 @@ from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 Floats = NDArray[np.float64]
 
-AGREEMENT = 1e-6
-"""Difference of the times of one event in two runs, relative to the run: rounding, multiplied by some impacts."""
+AGREEMENT = {"fused": 1e-6, "coupled": 1e-3}
+"""Difference of the times of one event in two runs, relative to the run: rounding, multiplied by some impacts; a cut
+makes other steps of the contact with another FMU's stop."""
 ROOM = 1e-12
 """Time after its end at which an event of a coupled run counts as at the end, s: `body/landing.c`."""
 MOST_EVENTS = 40
@@ -157,7 +158,7 @@ def check_that_recordings_add_up(scene: Scene, how: str, share: float, *, end: f
                 assert (first[:, 0] <= cut + ROOM).all()
                 assert (second[:, 0] >= cut).all()
                 both = np.concatenate([first, second])[:, [0, number]]
-                assert both == pytest.approx(all_rows[:, [0, number]], abs=AGREEMENT * end)
+                assert both == pytest.approx(all_rows[:, [0, number]], abs=AGREEMENT[how] * end)
             were_open += int(np.isnan(parts[0][0][:, 6]).sum())
     finally:
         driver.close()
@@ -273,4 +274,5 @@ def test_recordings_of_a_pair_add_up(law: str, cut: float, displacement: float, 
     for at in (cut, float(whole[-1])):
         if 0.0 < at < 4.0:
             parts = [events_of_pair(law, *window, displacement, up) for window in ((0.0, at), (at, 4.0))]
-            assert np.concatenate(parts) == pytest.approx(whole, abs=1e-6)
+            room = 1e-6 if law.startswith("restitution") else 1e-2  # a cut makes other steps of a contact
+            assert np.concatenate(parts) == pytest.approx(whole, abs=room)

@@ -126,7 +126,7 @@ class Pair:
         rate = max((rate.fastest() for rate in self._rates), default=0.0)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._force.begin(self._reduced)
-        self._is_new = True
+        self._is_new = self._is_at_start = True
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
@@ -173,7 +173,7 @@ class Pair:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
-        is_first, self.begins_pressed = self._is_new, False
+        is_first, self._is_at_start, self.begins_pressed = self._is_at_start, False, False
         if self._is_new and not self._pulses.under_way:
             self._ask_bodies(time, target - time)
         start, self._time = self.look(), time
