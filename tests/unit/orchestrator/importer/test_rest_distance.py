@@ -42,8 +42,8 @@ def test_the_overlap_of_bodies_at_rest_is_said_with_its_size(macro_step: float, 
     assert said is not None
     overlap, opening = (float(number) for number in said.groups())
     assert 1e-9 < max(overlap, opening) < most
-    assert -distance.min() <= 1.01 * overlap + 1e-12
-    assert distance.max() <= 1.01 * opening + 1e-12
+    assert -distance.min() <= 1.06 * overlap + 1e-12  # it is said to two digits
+    assert distance.max() <= 1.06 * opening + 1e-12
 
 
 def test_a_body_that_a_constant_force_holds_on_another_lies_on_it_without_a_remark() -> None:
