@@ -93,7 +93,7 @@ class RunRecord:
     impacts : ndarray of float, shape (impact, 7), or None
         Columns `IMPACT_COLUMNS`: impact_time (s), impact_phase (rad), impact_velocity (m/s),
         impact_impulse (N s), impact_contact (1-based), impact_restitution, impact_duration (s). The last two
-        may be left out, and are NaN then.
+        may be left out, and are NaN then. Of a contact that is open at the end they and the impulse are NaN.
     sticks : ndarray of float, shape (stick, 3), or None
         Columns `STICK_COLUMNS`: stick_start, stick_end (s; NaN: still stuck at the end), stick_contact.
     samples : ndarray of float, shape (sample, 1 + variables), or None

@@ -47,7 +47,7 @@ class RunsPlan(Structure):
         ("boolean_values", c_void_p),
         ("switches", RunsVariables),
         ("switch_values", c_void_p),
-        *((name, RunsVariables) for name in ("finals", "stuck")),
+        *((name, RunsVariables) for name in ("finals", "flags")),
         *((name, c_uint32) for name in ("record_count", "record_taken", "record_rows")),
         *((name, c_int32) for name in ("row_capacity", "chained", "displacement", "velocity", "phase", "stops")),
         ("stop_position", c_void_p),
@@ -59,7 +59,7 @@ class RunsPoints(Structure):
     """The points, and how far they are; `door/runs.h` says what each field is."""
 
     ARRAYS = (
-        "values", "begin", "end", "first", "outcome", "reached", "seconds", "finals", "stuck", "rows_of", "rows",
+        "values", "begin", "end", "first", "outcome", "reached", "seconds", "finals", "flags", "rows_of", "rows",
     )  # fmt: skip
     _fields_ = [
         ("count", c_int64),

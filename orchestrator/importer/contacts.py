@@ -38,6 +38,8 @@ class ContactBonds:
         Those of two bodies that hit each other.
     active : bool
         Any of them is closed in the step under way, or may have to be repeated.
+    met_at_start : list of Component
+        Where the step under way is the first: the bodies without event mode whose contacts begin with it.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class ContactBonds:
         self._rigid: dict[str, RigidStop] = {}
         self._held: list[HeldForceBond] = []
         self._following: list[ContactBond | HeldForceBond | Pair] = []
+        self.met_at_start: list[Component] = []
         self.active = False
 
     def _all(self) -> list[ContactBond | HeldForceBond]:
@@ -110,6 +113,8 @@ class ContactBonds:
         for bond in self._following:
             target = bond.begin_step(time, target, self._steps)
         self.active = any(bond.active for bond in self._following)
+        met = [pair.lower.body for pair in self.pairs.pairs if pair.begins_pressed]
+        self.met_at_start = [*(bond.body for bond in self._held if bond.begins_pressed), *met]
         return target
 
     def apply(self) -> None:
@@ -144,8 +149,8 @@ class ContactBonds:
         return [*(bond.body for bond in self._held if bond.arrived), *met]
 
     def remarks(self) -> list[str]:
-        """What a reader of the results must know of held forces."""
-        return [text for text in (bond.remark() for bond in self.held) if text]
+        """What a reader of the results must know of held forces, and of bodies at rest on each other."""
+        return [text for text in (bond.remark() for bond in (*self.held, *self.pairs.pairs)) if text]
 
     def free(self) -> None:
         """Give back what they have saved."""

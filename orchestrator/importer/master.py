@@ -272,6 +272,7 @@ class Importer:
         contacts, plan = self.contacts, self._plan
         if contacts:
             target = contacts.begin_step(time, target)
+            self._note(component.name for component in contacts.met_at_start)
         if plan.start_moves is not None:
             plan.start_moves()
         if contacts:

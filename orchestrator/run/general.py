@@ -135,7 +135,8 @@ class GeneralRunner:
         assert general is not None  # the constructor refuses any other
         self._deadline.begin(execution.deadline)
         self._limit, self._seen = execution.impact_limit, 0
-        self._events, self._recording = [], False
+        # what happens where the motion begins belongs to a recording that begins there
+        self._events, self._recording = [], record.transient_time == 0.0
         start: dict[tuple[str, str], Value] = {
             (c.name, name): value for c in general.components for name, value in c.parameters.items()
         }

@@ -46,7 +46,7 @@ from vibroimpact.orchestrator.scene.models import Record
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
-ENGINE = 5
+ENGINE = 6
 """Version of what follows our bodies, in C; with another one results differ, and no campaign mixes two."""
 
 SAMPLES_OF_A_BLOCK = 16_384
@@ -220,6 +220,11 @@ def late_message(deadline: float | None, time: float) -> str:
     return f"deadline: {deadline} s passed at time {time:.17g}"
 
 
+def no_load_message(contact: int) -> str:
+    """Return what a run says that ends at rest on a stop (from 1) on which nothing presses the body."""
+    return f"rests on stop[{contact}] without load"
+
+
 class _Run:
     """One run: when its recording begins and ends, and what it records."""
 
@@ -250,7 +255,20 @@ class _Run:
             return Outcome.impact_limit, limit_message(execution.impact_limit, driver.time)
         except DeadlineReached:
             return Outcome.timeout, late_message(execution.deadline, driver.time)
-        return (Outcome.stuck, "") if self._rests_for_ever() else (Outcome.ok, "")
+        return self._ended()
+
+    def _ended(self) -> tuple[Outcome, str]:
+        """Return how a run ended that came to its end."""
+        resting = self.driver.sticks_open()
+        pressed = [(contact, start) for contact, start in resting if self._load(contact) > 0.0]
+        if pressed and self._rests_for_ever(pressed):
+            return Outcome.stuck, ""
+        idle = [contact for contact, _ in resting if contact not in dict(pressed)]
+        return Outcome.ok, no_load_message(idle[0]) if idle else ""
+
+    def _load(self, contact: int) -> float:
+        """Return the force that presses the body on a stop now, N."""
+        return float(self.driver.values_of([f"contact[{contact}].force"])[0])
 
     def _go_measured(self) -> None:
         # only a scene with a measuring chain needs what follows it
@@ -294,16 +312,13 @@ class _Run:
 
     # ---- what was recorded ----
 
-    def _rests_for_ever(self) -> bool:
-        """Does the body rest on a stop for good?
+    def _rests_for_ever(self, resting: Sequence[tuple[int, float]]) -> bool:
+        """Does the body rest for good on stops that it is pressed on, each with the start of its rest?
 
         An oscillator: no phase of the force can lift it. A structure, whose other modes go on: an observation.
         The contact force has not reached zero over the whole recording or, without a period, over one of the
         slowest mode, within which every mode of the held body has pulled at its strongest.
         """
-        resting = self.driver.sticks_open()
-        if not resting:
-            return False
         if isinstance(self.scene.body, OscillatorBody):
             return self._is_pressed(self.scene.body, resting[0][0])
         slowest = self.driver.slowest() if self.scene.period is None else 0.0

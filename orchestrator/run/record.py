@@ -23,6 +23,8 @@ ROW_CAPACITY = 512
 ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
 _NOTHING: NDArray[np.float64] = np.empty(0)
 OBSERVED = ("displacement", "velocity")
+TOUCH_DOWN = ("last_time", "last_phase", "last_velocity")
+"""What a contact port tells of the contact that goes on there: when (s, rad) and how fast (m/s) it began."""
 
 
 class RunEnded(Exception):
@@ -89,6 +91,26 @@ def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     time = rows[:, 0]
     return rows[np.argsort(time, kind="stable")] if (np.diff(time) < 0.0).any() else rows
+
+
+def open_contacts(touch_downs: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the impacts of contacts that are open, shape (n, 7): impulse, restitution and duration are NaN.
+
+    Parameters
+    ----------
+    touch_downs : ndarray, shape (n, 3)
+        Columns `TOUCH_DOWN`.
+    contacts : ndarray, shape (n,)
+        Numbers of the contacts, from 1.
+
+    Examples
+    --------
+    >>> open_contacts(np.array([[2.0, 0.5, 0.1]]), np.array([1.0])).tolist()
+    [[2.0, 0.5, 0.1, nan, 1.0, nan, nan]]
+    """
+    rows = np.full((len(contacts), ROW_WIDTH - 1), np.nan)
+    rows[:, :3], rows[:, 4] = touch_downs, contacts
+    return rows
 
 
 @dataclass(slots=True)
@@ -158,6 +180,8 @@ class RecordedBody(ABC):
         ports = [f"contact[{k}]" for k in range(1, contacts + 1)]
         self._stuck = self._some("Boolean", [f"{port}.stuck" for port in ports])
         self._stick_starts = self._some("Float64", [f"{port}.stick_start" for port in ports])
+        self._open = self._some("Boolean", [f"{port}.open" for port in ports])
+        self._touch_downs = self._some("Float64", [f"{port}.{name}" for port in ports for name in TOUCH_DOWN])
         self._sampled, self._sampled_names = self._some("Float64", sampled), tuple(sampled)
         self._state = self._some("Float64", state)
         self._energies = self._some("Boolean", ["record.energies"] if energies else [])
@@ -199,9 +223,10 @@ class RecordedBody(ABC):
         return self._group_of("Float64", names, None)
 
     def record(self, *, impacts: bool, extrema: bool, periods: bool) -> None:
-        """Say what the body records from now on; its energies count from here."""
-        self._switches.values[:] = (impacts, extrema, periods)
-        self._switches.set()
+        """Begin a recording: say what the body records from now on; its energies count from here."""
+        for switches in ((False, False, False), (impacts, extrema, periods)):
+            self._switches.values[:] = switches
+            self._switches.set()
         if self._energies is not None:
             self._energies.values[:] = True
             self._energies.set()
@@ -216,15 +241,32 @@ class RecordedBody(ABC):
             self._taken.set()
 
     def impacts(self) -> NDArray[np.float64]:
-        """Return the impacts so far by time of touch-down, shape (n, 7): columns `schema.IMPACT_COLUMNS`."""
+        """Return the impacts so far by time of touch-down, shape (n, 7): columns `schema.IMPACT_COLUMNS`.
+
+        A contact that is open has no impulse, restitution and duration yet: NaN.
+        """
         self.take_rows()
-        return in_time_order(self.rows.of_kind(ROW_IMPACT))
+        return in_time_order(np.concatenate([self.rows.of_kind(ROW_IMPACT), self._contacts_open()]))
+
+    def _contacts_open(self) -> NDArray[np.float64]:
+        """Return the contacts with stops that yield that began in the recording and go on, shape (n, 7)."""
+        if self._open is None or self._touch_downs is None or self._stuck is None:
+            return np.empty((0, ROW_WIDTH - 1))
+        going = np.flatnonzero(self._open.get() & ~self._stuck.get())
+        if not len(going):
+            return np.empty((0, ROW_WIDTH - 1))
+        return open_contacts(self._touch_downs.get().reshape(-1, len(TOUCH_DOWN))[going], going + 1.0)
 
     def sticks(self) -> NDArray[np.float64]:
         """Return the sticks so far by their start, shape (n, 3): start, end (NaN: not ended), contact."""
         self.take_rows()
         ended = self.rows.of_kind(ROW_STICK)[:, :3]
-        still = [(start, np.nan, float(contact)) for contact, start in self.sticks_open()]
+        of_recording: list[bool] = [] if self._open is None else self._open.get().tolist()
+        still = [
+            (start, np.nan, float(contact))
+            for contact, start in self.sticks_open()
+            if of_recording[contact - 1]
+        ]
         return in_time_order(np.concatenate([ended, np.array(still).reshape(-1, 3)]))
 
     def observed(self) -> tuple[float, float]:

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.models import RestitutionStop
 
 Floats = NDArray[np.float64]
 
@@ -68,29 +66,6 @@ class Observation:
     def displacement_range(self) -> float:
         """Largest minus smallest displacement, m."""
         return self.highest - self.lowest
-
-
-def ended(impacts: Floats, scene: Scene, forces: Floats) -> Floats:
-    """Return impacts without those whose contact is not over: a record has them when a stop that yields lets go.
-
-    Parameters
-    ----------
-    impacts : ndarray, shape (impact, 3)
-    scene : Scene
-        Of the short form.
-    forces : ndarray, shape (stop,)
-        Of each stop at the end, N.
-
-    Returns
-    -------
-    ndarray, shape (impact, 3)
-    """
-    kept = np.ones(len(impacts), dtype=bool)
-    for k, stop in enumerate(scene.stops):
-        own = np.flatnonzero(impacts[:, 2] == k + 1)
-        if len(own) and forces[k] > 0.0 and not isinstance(stop, RestitutionStop):
-            kept[own[-1]] = False
-    return impacts[kept]
 
 
 def observation_of(record: RunRecord) -> Observation:

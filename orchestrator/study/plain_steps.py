@@ -16,15 +16,15 @@ from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.models import RestitutionStop
-from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation, ended
+from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
 from vibroimpact.orchestrator.study.strangers import stranger_of, thrown_back
 
 
 class _Seen:
     """What steps of equal size show of a motion: its extremes after them, and when it was found beyond a stop."""
 
-    def __init__(self, scene: Scene, begin: float) -> None:
-        self._scene, self._begin = scene, begin
+    def __init__(self, begin: float) -> None:
+        self._begin = begin
         self.impacts: list[tuple[float, float, float]] = []
         self.lowest, self.highest = math.inf, -math.inf
 
@@ -38,12 +38,9 @@ class _Seen:
         if now > self._begin:
             self.impacts.append((now, abs(velocity), stop + 1.0))
 
-    def observation(
-        self, final: tuple[float, float], began: float, failure: str, forces: Floats | None = None
-    ) -> Observation:
-        """Return it as what a run shows; stops that yield have forces at its end, N."""
+    def observation(self, final: tuple[float, float], began: float, failure: str) -> Observation:
+        """Return it as what a run shows."""
         found = np.array(self.impacts).reshape(-1, 3)
-        found = found if forces is None else ended(found, self._scene, forces)
         seconds = time.perf_counter() - began
         return Observation(found, self.lowest, self.highest, final, seconds=seconds, failure=failure)
 
@@ -85,7 +82,7 @@ class PlainStepsTrial:
         w = self._floats.get("forcing.angular_frequency", 0.0)
         phase = self._floats.get("forcing.phase", 0.0)
         limit = math.inf if scene.execution.deadline is None else began + scene.execution.deadline
-        seen, origin, failure = _Seen(scene, begin), 0.0, ""
+        seen, origin, failure = _Seen(begin), 0.0, ""
         driver.begin(self._floats, scene.execution.deadline)
         try:
             for i in range(1, math.ceil(end / self._step) + 1):
@@ -174,7 +171,7 @@ class PlainForcesTrial:
         began, driver, scene = time.perf_counter(), self._driver, self._scene
         begin, end = recorded_window(scene, self._floats)
         touching = [False] * len(self._stops)
-        seen, failure, now = _Seen(scene, begin), "", 0.0
+        seen, failure, now = _Seen(begin), "", 0.0
         driver.begin(self._floats, scene.execution.deadline)
         for stop, own in zip(self._stops, self._own, strict=True):
             stop.begin(own, 0.0, first=self._first)
@@ -201,8 +198,7 @@ class PlainForcesTrial:
                     touching[k] = inside
         except DeadlineReached:
             failure = LATE
-        forces = np.array([float(answer.get()[0]) for answer in self._answers])
-        return seen.observation(driver.observed(), began, failure, forces)
+        return seen.observation(driver.observed(), began, failure)
 
     def _push(self) -> None:
         """Write what the stops answer into the force inputs of the body."""

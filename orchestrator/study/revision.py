@@ -19,7 +19,7 @@ from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters,
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.observation import LATE, Observation, ended
+from vibroimpact.orchestrator.study.observation import LATE, Observation
 from vibroimpact.orchestrator.study.strangers import stranger_of
 
 
@@ -71,8 +71,6 @@ class RevisedTrial:
         component = self._importer.components[BODY]
         self._motion = component.group("Float64", ["displacement", "velocity"])
         self._contacts = component.group("Float64", [*stranger.displacements, *stranger.velocities])
-        stops = (self._importer.components[stop_name(k)] for k in range(1, count + 1))
-        self._forces = [stop.group("Float64", ["applied_force"]) for stop in stops]
         self._switch = component.group("Boolean", ["record.extrema"])
         self._extremes = component.group("Float64", ["record.displacement_min", "record.displacement_max"])
         self._positions = np.array([stop.position for stop in scene.stops])
@@ -86,9 +84,9 @@ class RevisedTrial:
         """Simulate the scene once."""
         began = time.perf_counter()
         self._impacts: list[tuple[float, float, float]] = []
-        self._recording, failure = False, ""
-        self._deadline.begin(self._seconds)
         begin, end = self._window
+        self._recording, failure = begin == 0.0, ""
+        self._deadline.begin(self._seconds)
         try:
             self._importer.begin(0.0, self._values)
             self._importer.advance(begin)
@@ -102,7 +100,7 @@ class RevisedTrial:
         displacement, velocity = map(float, self._motion.get())
         impacts = np.array(self._impacts).reshape(-1, 3)
         return Observation(
-            ended(impacts, self._scene, np.array([float(force.get()[0]) for force in self._forces])),
+            impacts,
             lowest,
             highest,
             (displacement, velocity),

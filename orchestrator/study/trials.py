@@ -30,7 +30,7 @@ from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters,
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation, ended
+from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
 
 ROWS_A_PERIOD = 4
 """Rows of an integration in a period, times the square of the number of modes: an integrator's steps between two rows
@@ -72,7 +72,6 @@ class CoupledTrial:
         component = self._importer.components[BODY]
         self._motion = component.group("Float64", ["displacement", "velocity"])
         self._counts = component.group("Int64", [f"contact[{k}].count" for k in range(1, stops + 1)])
-        self._forces = component.group("Float64", [f"contact[{k}].force" for k in range(1, stops + 1)])
         names = [f"contact[{k}].last_{what}" for k in range(1, stops + 1) for what in ("time", "velocity")]
         self._last = component.group("Float64", names)
         self._switch = component.group("Boolean", ["record.extrema"])
@@ -97,6 +96,8 @@ class CoupledTrial:
             self._importer.advance(begin)
             self._recording = True
             self._counts.get()
+            if begin == 0.0:
+                self._counts.values[:] = 0  # contacts that the start state has closed are new
             self._switch.values[:] = True
             self._switch.set()
             self._importer.advance(end)
@@ -106,7 +107,7 @@ class CoupledTrial:
         lowest, highest = map(float, self._extremes.get())
         displacement, velocity = map(float, self._motion.get())
         return Observation(
-            ended(np.array(self._impacts).reshape(-1, 3), self._scene, self._forces.get()),
+            np.array(self._impacts).reshape(-1, 3),
             lowest,
             highest,
             (displacement, velocity),
@@ -163,7 +164,7 @@ class ModelExchangeTrial:
             return time.perf_counter() < limit
 
         ports = range(1, len(scene.stops) + 1)
-        told = ("count", "last_time", "last_velocity", "force")
+        told = ("count", "last_time", "last_velocity")
         output = [f"contact[{k}].{what}" for k in ports for what in told]
         interval = (scene.period or end) / (ROWS_A_PERIOD * getattr(scene.body, "size", 1) ** 2)
         try:
@@ -186,10 +187,10 @@ class ModelExchangeTrial:
             times, velocities = (rows[f"contact[{k}].last_{what}"][new] for what in ("time", "velocity"))
             found.append(np.column_stack([times, velocities, np.full(len(new), float(k))]))
         impacts = np.concatenate(found)
-        impacts = impacts[(impacts[:, 0] > begin) & (impacts[:, 0] <= end)]
-        forces = np.array([rows[f"contact[{k}].force"][-1] for k in ports])
+        within = (impacts[:, 0] > begin) | (begin == 0.0)
+        impacts = impacts[within & (impacts[:, 0] <= end)]
         return Observation(
-            ended(impacts[np.argsort(impacts[:, 0], kind="stable")], scene, forces),
+            impacts[np.argsort(impacts[:, 0], kind="stable")],
             final=(float(rows["displacement"][-1]), float(rows["velocity"][-1])),
             seconds=time.perf_counter() - began,
             failure=LATE if late else "",

@@ -57,6 +57,8 @@ LOW = 64.0
 #: pressed together.
 SMALL = 1e-3
 MOST_SMALL_BOUNCES = 1000
+#: Distance of bodies at rest on each other that a reader is told of, relative to the largest displacement.
+TOLD_DISTANCE = 1e-9
 #: A step longer than its limit by more than this factor, as its end shows, is made shorter.
 SLACK = 1.5
 
@@ -74,6 +76,8 @@ class Pair:
         Steps may have to be repeated: always.
     restitution : float
         Coefficient of restitution.
+    begins_pressed : bool
+        The step under way is the first, and a contact that yields begins with it.
     """
 
     active = True
@@ -122,11 +126,12 @@ class Pair:
         rate = max((rate.fastest() for rate in self._rates), default=0.0)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._force.begin(self._reduced)
-        self._is_new = True
+        self._is_new = self._is_at_start = True
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
-        self.arrived = self.closed = self._pressed = False
+        self._overlap = self._opening = 0.0  # of bodies at rest, m
+        self.arrived = self.closed = self._pressed = self.begins_pressed = False
         gap = self.look().gap
         if not gap >= -self._scale.room(time) and not self.yields:
             raise ComponentError(
@@ -168,6 +173,7 @@ class Pair:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
+        is_first, self._is_at_start, self.begins_pressed = self._is_at_start, False, False
         if self._is_new and not self._pulses.under_way:
             self._ask_bodies(time, target - time)
         start, self._time = self.look(), time
@@ -183,6 +189,7 @@ class Pair:
         self.closed = self._force.resting
         if self.yields:
             self.closed = self._touches(start)
+            self.begins_pressed = is_first and self.closed
         self._steps = steps
         target = min(target, time + self._longest)
         if not self.closed:
@@ -267,8 +274,18 @@ class Pair:
         deep = DEEP * self._scale.displacement + self._room
         if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
+        if self.rests:
+            gap = self.look().gap + self._surface
+            self._overlap, self._opening = max(self._overlap, -gap), max(self._opening, gap)
         met = abs(end - self._agreed) <= precision_at(end) or self._touches(self.look())
         self.arrived = self.yields and not self.closed and met
+
+    def remark(self) -> str:
+        """Return what a reader of the results must know of bodies at rest; empty where there is nothing."""
+        if not max(self._overlap, self._opening) > TOLD_DISTANCE * self._scale.displacement:
+            return ""
+        told = f"overlap by up to {self._overlap:.2g} m and part by up to {self._opening:.2g} m"
+        return f"{self.name}: bodies at rest on each other {told}. Use a shorter macro_step"
 
     def _touches(self, now: Motion) -> bool:
         return now.gap < -self._room or (now.gap <= self._room and now.closing > 0.0)

@@ -86,6 +86,8 @@ class HeldForceBond:
         The contact is closed in the step under way.
     arrived : bool
         The step just made has ended at the surface.
+    begins_pressed : bool
+        The step under way is the first, and the contact begins with it.
     mass : float or None
         Effective mass of the contact point, kg; None until a trial step finds it.
     residual : float
@@ -107,7 +109,7 @@ class HeldForceBond:
         self._trials = TrialSteps(self.body, spec.velocity, self._input)
         self.revisable = self.body.has_states
         self.given_mass = spec.mass
-        self.active = self.closed = self.arrived = False
+        self.active = self.closed = self.arrived = self.begins_pressed = False
         self.residual = 0.0
 
     def begin(self) -> None:
@@ -115,8 +117,9 @@ class HeldForceBond:
         self.stop.begin()
         self._input.parts[self.contact.stop] = 0.0
         self.mass = self.given_mass
-        self.active = self.closed = self.arrived = False
+        self.active = self.closed = self.arrived = self.begins_pressed = False
         self.residual = 0.0
+        self._is_new = True
         self._work = ContactWork()
         self._other, self._other_slope = 0.0, 0.0
         self._told: tuple[float, float, float] | None = None
@@ -152,6 +155,8 @@ class HeldForceBond:
                 size = self._foresee(min(size, max(self._limit, self._room)))
             elif not self.revisable:
                 size = self._foreseen_arrival(size)
+            self.begins_pressed = self._is_new and self.closed and self._presses(size)
+        self._is_new = False
         self.active = self.closed or self.revisable
         self._planned = target if size == target - time else time + size
         return self._planned
@@ -232,6 +237,11 @@ class HeldForceBond:
         self._told, self._other = (middle, other, path.size), other
 
     # ---- touching, arriving ----
+
+    def _presses(self, size: float) -> bool:
+        """Is the body in the stop's force at the start of the step, or on its way in?"""
+        displacement, velocity = self._start
+        return velocity > 0.0 or self.stop.force(displacement, velocity, size) > 0.0
 
     def _touches(self, displacement: float, velocity: float, size: float) -> bool:
         """Is the body in the stop's force, or on the surface and on its way in?"""

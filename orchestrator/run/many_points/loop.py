@@ -19,7 +19,7 @@ from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.opening import Runner
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.point import PointRunner, forced_window
-from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY
+from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY, TOUCH_DOWN
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 from vibroimpact.orchestrator.scene.keys import MODES
@@ -98,8 +98,10 @@ class PointLoop:
     def __init__(self, scene: Scene, driver: BodyDriver, *, by_lanes: bool = False) -> None:
         self.scene, self.driver, self.by_lanes = scene, driver, by_lanes
         ports = [f"contact[{k}]" for k in range(1, len(scene.stops) + 1)]
-        self._stuck = tuple(f"{port}.stuck" for port in ports)
-        finals = (*OBSERVED, *state_variables(scene), *(f"{port}.stick_start" for port in ports))
+        self._flags = tuple(f"{port}.{name}" for name in ("stuck", "open") for port in ports)
+        touch_downs = [f"{port}.{name}" for port in ports for name in TOUCH_DOWN]
+        others = [f"{port}.{name}" for name in ("stick_start", "force") for port in ports]
+        finals = (*OBSERVED, *state_variables(scene), *others, *touch_downs)
         is_oscillator = isinstance(scene.body, OscillatorBody)
         self.finals = finals if is_oscillator else (*finals, "natural_angular_frequency[1]")
         self._kept: list[NDArray[Any]] = []  # what C reads while it runs
@@ -140,7 +142,7 @@ class PointLoop:
             switches=self._variables(["record.impacts", "record.extrema", "record.periods"]),
             switch_values=self._address([record.impacts, record.extrema, self._periods(forced)], np.bool_),
             finals=self._variables(self.finals),
-            stuck=self._variables(self._stuck),
+            flags=self._variables(self._flags),
             record_count=references["record.count"],
             record_taken=references["record.taken"],
             record_rows=references["record.rows"],

@@ -15,7 +15,7 @@ from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of,
 from vibroimpact.fmus.core import runs as core
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PreparedPoints
 from vibroimpact.orchestrator.run.parameters import state_variables
-from vibroimpact.orchestrator.run.point import TWO_PI, late_message, limit_message
+from vibroimpact.orchestrator.run.point import TWO_PI, late_message, limit_message, no_load_message
 from vibroimpact.orchestrator.run.record import (
     OBSERVED,
     ROW_CAPACITY,
@@ -23,7 +23,9 @@ from vibroimpact.orchestrator.run.record import (
     ROW_PERIOD,
     ROW_STICK,
     ROW_WIDTH,
+    TOUCH_DOWN,
     in_time_order,
+    open_contacts,
 )
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
@@ -101,7 +103,7 @@ class _Loop:
             "reached": np.zeros(count),
             "seconds": np.zeros(count),
             "finals": np.zeros((count, len(loop.finals))),
-            "stuck": np.zeros((count, contacts), dtype=np.bool_),
+            "flags": np.zeros((count, 2 * contacts), dtype=np.bool_),
             "rows_of": np.zeros(count, dtype=np.int64),
             "rows": np.zeros((ROWS_ROOM, ROW_WIDTH)),
         }
@@ -163,6 +165,8 @@ class _Loop:
         self._take_rows()
         done, record, scene = self.state.at, self._loop.scene.record, self._loop.scene
         arrays = {name: array[:done] for name, array in self._arrays.items() if name != "rows"}
+        contacts = len(scene.stops)
+        arrays["stuck"], arrays["open"] = arrays["flags"][:, :contacts], arrays["flags"][:, contacts:]
         rows = np.concatenate(self._blocks)
         owner = np.repeat(np.arange(done), arrays["rows_of"])
         finals, elements = arrays["finals"], len(state_variables(scene))
@@ -176,17 +180,25 @@ class _Loop:
             final_phase=self._final_phase(outcome, arrays["reached"]),
             final_state=finals[:, len(OBSERVED) : len(OBSERVED) + elements] if elements else None,
             periods=period_table(rows, owner, done) if self._points.periods else None,
-            impacts=ragged_rows(rows, owner, done, ROW_IMPACT, len(IMPACT_COLUMNS))
-            if record.impacts
-            else None,
+            impacts=self._impacts(rows, owner, arrays) if record.impacts else None,
             sticks=self._sticks(rows, owner, arrays) if record.impacts else None,
         )
 
+    def _of_contacts(self, arrays: dict[str, NDArray[Any]], block: int, width: int = 1) -> Floats:
+        """Return a block of what was read of the contacts at the end, shape (run, contact * width)."""
+        contacts = arrays["stuck"].shape[1]
+        begin = len(OBSERVED) + len(state_variables(self._loop.scene)) + block * contacts
+        found: Floats = arrays["finals"][:, begin : begin + width * contacts]
+        return found
+
     def _stick_starts(self, arrays: dict[str, NDArray[Any]]) -> Floats:
-        """Return when the rest on each contact began, s; NaN where the body does not rest on it."""
-        begin = len(OBSERVED) + len(state_variables(self._loop.scene))
-        starts = arrays["finals"][:, begin : begin + arrays["stuck"].shape[1]]
-        return np.where(arrays["stuck"], starts, np.nan)
+        """Return when the rest on each contact began, s; NaN where the body is not pressed on it at rest."""
+        return np.where(self._pressed(arrays), self._of_contacts(arrays, 0), np.nan)
+
+    def _pressed(self, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+        """Return whether a load presses the resting body on each contact."""
+        pressed: NDArray[np.bool_] = arrays["stuck"] & (self._of_contacts(arrays, 1) > 0.0)
+        return pressed
 
     def _ended(self, arrays: dict[str, NDArray[Any]]) -> tuple[NDArray[np.int8], NDArray[np.object_]]:
         """Return how each point ended, and its message."""
@@ -198,13 +210,17 @@ class _Loop:
         for place in np.flatnonzero(outcome == Outcome.timeout):
             message[place] = late_message(execution.deadline, float(arrays["reached"][place]))
         if arrays["stuck"].any():
-            outcome[(outcome == Outcome.ok) & self._rests_for_ever(arrays)] = Outcome.stuck
+            pressed = self._pressed(arrays)
+            outcome[(outcome == Outcome.ok) & self._rests_for_ever(pressed, arrays)] = Outcome.stuck
+            idle = arrays["stuck"] & ~pressed
+            for place in np.flatnonzero((outcome == Outcome.ok) & idle.any(axis=1)):
+                message[place] = no_load_message(int(idle[place].argmax()) + 1)
         return outcome, message
 
-    def _rests_for_ever(self, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    def _rests_for_ever(self, rests: NDArray[np.bool_], arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
         """As `point` says it: pressed for good (an oscillator), or at rest for long enough."""
         scene, columns, points = self._loop.scene, self._points.columns, self._points
-        resting, count = arrays["stuck"].any(axis=1), len(arrays["stuck"])
+        resting, count = rests.any(axis=1), len(rests)
         if not isinstance(scene.body, OscillatorBody):
             starts = self._stick_starts(arrays)
             began = np.fmin.reduce(starts, axis=1)
@@ -218,7 +234,7 @@ class _Loop:
             return resting & is_settled
         pressed = np.zeros(count, dtype=np.bool_)
         lifting = np.abs(columns.get("forcing.amplitude", np.zeros(count))[:count])
-        contact = arrays["stuck"].argmax(axis=1)
+        contact = rests.argmax(axis=1)
         for k, stop in enumerate(scene.stops):
             sign = 1.0 if stop.side == "upper" else -1.0
             spring = columns["stiffness"][:count] * columns[f"contact[{k + 1}].position"][:count]
@@ -235,18 +251,33 @@ class _Loop:
         )
         return final_phases(outcome, reached, frequency, phase)
 
+    def _impacts(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
+        """Return the impacts of each point, contacts that have not ended among them."""
+        run, contact = np.nonzero(arrays["open"] & ~arrays["stuck"])
+        width = len(TOUCH_DOWN)
+        touch_downs = self._of_contacts(arrays, 2, width).reshape(len(arrays["stuck"]), -1, width)
+        still = np.full((len(run), ROW_WIDTH), ROW_IMPACT)
+        still[:, 1:] = open_contacts(touch_downs[run, contact], contact + 1.0)
+        return _with_open(rows, owner, still, run, len(arrays["stuck"]), ROW_IMPACT, len(IMPACT_COLUMNS))
+
     def _sticks(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
         """Return the sticks of each point, those that have not ended among them."""
-        done = len(arrays["stuck"])
-        run, contact = np.nonzero(arrays["stuck"])
+        run, contact = np.nonzero(arrays["stuck"] & arrays["open"])
         still = np.full((len(run), ROW_WIDTH), np.nan)
         still[:, 0], still[:, 3] = ROW_STICK, contact + 1.0
-        still[:, 1] = self._stick_starts(arrays)[run, contact]
-        ended = rows[:, 0] == ROW_STICK
-        owners = np.concatenate([owner[ended], run])
-        order = np.argsort(owners, kind="stable")
-        together = np.concatenate([rows[ended], still])[order]
-        return ragged_rows(together, owners[order], done, ROW_STICK, len(STICK_COLUMNS))
+        still[:, 1] = self._of_contacts(arrays, 0)[run, contact]
+        return _with_open(rows, owner, still, run, len(arrays["stuck"]), ROW_STICK, len(STICK_COLUMNS))
+
+
+def _with_open(
+    rows: Floats, owner: Ints, still: Floats, run: Ints, done: int, kind: float, columns: int
+) -> Ragged:
+    """Return the rows of a kind by their run, with those of what has not ended in it."""
+    ended = rows[:, 0] == kind
+    owners = np.concatenate([owner[ended], run])
+    order = np.argsort(owners, kind="stable")
+    together = np.concatenate([rows[ended], still])[order]
+    return ragged_rows(together, owners[order], done, kind, columns)
 
 
 def final_phases(

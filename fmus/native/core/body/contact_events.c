@@ -17,6 +17,7 @@ void vi_contact_hit(vi_contact *contact, vi_record *record, const vi_clock *cloc
 void vi_contact_stick(vi_contact *contact, const vi_clock *clock, vi_instant now, double delay)
 {
     contact->stuck = 1;
+    contact->earlier = 0;
     contact->stick_start = vi_clock_time(clock, vi_clock_after(clock, now, delay));
     contact->stick_end = NAN;
 }

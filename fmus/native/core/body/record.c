@@ -14,8 +14,10 @@ void vi_record_take(vi_record *record)
     record->taken = 0;
 }
 
-void vi_record_begin_step(vi_record *record, double displacement)
+bool vi_record_begin_step(vi_record *record, double displacement)
 {
+    const int32_t was_recording = record->recording;
+    record->recording = record->impacts || record->periods;
     if (record->extrema && !record->open) {
         record->displacement_max = record->displacement_min = displacement;
     }
@@ -23,6 +25,12 @@ void vi_record_begin_step(vi_record *record, double displacement)
     if (!record->periods) {
         record->period_open = 0;
     }
+    return record->recording && !was_recording;
+}
+
+void vi_record_switched(vi_record *record)
+{
+    record->recording = record->recording && (record->impacts || record->periods);
 }
 
 bool vi_record_full(const vi_record *record)
@@ -43,7 +51,6 @@ static void append(vi_record *record, const double row[VI_RECORD_WIDTH])
 void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                        double restitution, double duration)
 {
-    record->period_impacts += 1;
     if (record->impacts) {
         const double row[] = {VI_ROW_IMPACT, time, phase, velocity, impulse, (double)contact, restitution, duration};
         append(record, row);
@@ -53,6 +60,7 @@ void vi_record_contact(vi_record *record, double time, double phase, double velo
 void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                       double restitution)
 {
+    record->period_impacts += 1;
     vi_record_contact(record, time, phase, velocity, impulse, contact, restitution, 0.0);
 }
 

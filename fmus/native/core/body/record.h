@@ -16,6 +16,7 @@ enum { VI_ROW_IMPACT = 1, VI_ROW_STICK = 2, VI_ROW_PERIOD = 3 };
 typedef struct {
     /* inputs */
     int32_t impacts, extrema, periods;
+    int32_t recording; /* impacts or periods are written: a recording goes on */
     int64_t taken;
     /* outputs */
     double displacement_max, displacement_min; /* m */
@@ -32,15 +33,18 @@ typedef struct {
 /* Drop the first `taken` rows: the importer has them. */
 void vi_record_take(vi_record *record);
 
-/* Start of a step: open or close what the importer switched on or off. */
-void vi_record_begin_step(vi_record *record, double displacement);
+/* Start of a step: open or close what the importer switched on or off. Does a recording begin? */
+bool vi_record_begin_step(vi_record *record, double displacement);
+
+/* The importer has set an input: a recording ends where both of its switches are off, be it for no step. */
+void vi_record_switched(vi_record *record);
 
 /* Is there too little room for what one event may write? */
 bool vi_record_full(const vi_record *record);
 
 void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                       double restitution);
-/* The whole contact with a compliant stop, written when it ends; its duration in s. */
+/* The whole contact with a compliant stop, written when it ends; its duration in s. Its period has counted it before. */
 void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                        double restitution, double duration);
 void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse);

@@ -20,6 +20,8 @@ typedef struct {
     int32_t answered; /* applied_restitution was set since the pending contact was reported */
     /* outputs */
     int32_t stuck;
+    int32_t open;    /* a rest, or a contact with a stop that yields, of the present recording goes on */
+    int32_t earlier; /* no output: what goes on began before the present recording */
     double displacement, velocity, mass, force, impulse;
     double total_impulse; /* of impacts and summed chatter since the start, N s; forces are no part of it */
     double indicator; /* of model exchange; 0 in co-simulation */
@@ -40,7 +42,7 @@ static inline void vi_contact_struck(vi_contact *contact, double time)
 /* Nothing has happened at this contact yet. */
 static inline void vi_contact_clear(vi_contact *contact)
 {
-    contact->stuck = contact->answered = 0;
+    contact->stuck = contact->answered = contact->open = contact->earlier = 0;
     contact->count = contact->graze_count = 0;
     contact->force = contact->impulse = contact->total_impulse = contact->last_velocity = 0.0;
     contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;

@@ -138,11 +138,11 @@ static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points
         return came_to;
     }
     double *finals = p->finals + (size_t)p->at * plan->finals.count;
-    bool *stuck = p->stuck + (size_t)p->at * plan->stuck.count;
+    bool *flags = p->flags + (size_t)p->at * plan->flags.count;
     if (!went_well(f->get_float64(f->instance, plan->finals.references, plan->finals.count, finals, plan->finals.count))
-        || (plan->stuck.count > 0
-            && !went_well(f->get_boolean(f->instance, plan->stuck.references, plan->stuck.count, stuck,
-                                         plan->stuck.count)))
+        || (plan->flags.count > 0
+            && !went_well(f->get_boolean(f->instance, plan->flags.references, plan->flags.count, flags,
+                                         plan->flags.count)))
         || !isfinite(finals[0])) {
         return VI_RUNS_REFUSED;
     }

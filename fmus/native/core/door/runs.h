@@ -54,7 +54,7 @@ typedef struct {
     const bool *boolean_values;
     vi_runs_variables switches; /* of the record, set when recording begins */
     const bool *switch_values;
-    vi_runs_variables finals, stuck; /* read at the end */
+    vi_runs_variables finals, flags; /* read at the end */
     uint32_t record_count, record_taken, record_rows;
     int32_t row_capacity; /* of the body's record */
     /* A run of a branch starts from the state where the one before ended: the places of displacement, velocity and phase
@@ -72,7 +72,7 @@ typedef struct {
     const uint8_t *first;       /* a branch begins here */
     int8_t *outcome;
     double *reached, *seconds, *finals;
-    bool *stuck;
+    bool *flags;
     int64_t *rows_of; /* rows of each */
     double *rows;     /* [rows_room][VI_RECORD_WIDTH] */
     int64_t rows_room, rows_used;

@@ -47,6 +47,7 @@ static bool stops_here(const vi_structure *s, vi_instant target, const vi_step_r
 
 static void record_period(const vi_structure *s)
 {
+    vi_structure_count_contacts(s);
     vi_record_period(s->record, vi_clock_time(&s->model->clock, s->state->now), vi_structure_observed(s),
                      vi_structure_at(s->model, s->model->observed, s->state->p));
 }
@@ -61,6 +62,7 @@ static double one_release(const vi_structure *s)
 static void move(const vi_structure *s, double u, vi_ending end, vi_instant target)
 {
     vi_structure_state *state = s->state;
+    state->moved |= u > 0.0;
     const vi_instant after = end == VI_ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
         if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]
@@ -332,7 +334,9 @@ static bool loads_are_finite(const vi_structure *s)
 
 static void begin_step(const vi_structure *s)
 {
-    vi_record_begin_step(s->record, vi_structure_observed(s));
+    if (vi_record_begin_step(s->record, vi_structure_observed(s))) {
+        vi_structure_begin_recording(s);
+    }
     for (int k = 0; k < s->model->contacts; ++k) {
         s->contacts[k].event_time = NAN;
     }
@@ -340,7 +344,9 @@ static void begin_step(const vi_structure *s)
         vi_structure_settle(s, true); /* nothing of the step is over yet */
     }
     if (s->record->periods && !s->record->period_open && s->state->now.rest == 0.0) {
+        const int64_t impacts = s->record->period_impacts; /* of this instant */
         record_period(s);
+        s->record->period_impacts = impacts;
     }
 }
 
@@ -391,6 +397,7 @@ void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])
         contact->displacement = on_stop ? contact->position : vi_structure_at(s->model, shape, s->state->q);
         contact->velocity = status == VI_CONTACT_HELD ? 0.0 : vi_structure_at(s->model, shape, s->state->p);
         contact->force = vi_max(0.0, force[k]);
+        contact->open = vi_structure_is_open(s, k);
     }
 }
 

@@ -296,6 +296,7 @@ void vi_structure_component_was_set(vi_structure_component *c, uint32_t referenc
         return;
     }
     c->inputs_changed = 1;
+    vi_record_switched(&c->record);
     if (from_first % stride == 0 && from_first / stride < VI_PORTS) {
         c->contacts[from_first / stride].answered = 1;
     }

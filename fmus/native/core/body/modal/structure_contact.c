@@ -49,7 +49,7 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
     vi_contact *contact = &s->contacts[k];
     int touching[VI_PORTS];
     vi_contact_lift(contact, &s->model->clock, s->state->now);
-    if (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0) {
+    if (!contact->earlier && (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0)) {
         vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
     }
     those_held_by(s, k, touching);
@@ -61,6 +61,13 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
 }
 
 /* ---- compliant stops ---- */
+
+/* The period in which a contact begins counts it once. */
+static void count_once(const vi_structure *s, int k)
+{
+    s->record->period_impacts += !s->state->touch_down[k].counted;
+    s->state->touch_down[k].counted = 1;
+}
 
 void vi_structure_touch_down(const vi_structure *s, int k)
 {
@@ -77,7 +84,11 @@ void vi_structure_touch_down(const vi_structure *s, int k)
         s->state->leaving[k] = approach > 0.0 ? 1 : 2;
     }
     s->state->touch_down[k] = (vi_touch_down){vi_clock_time(clock, s->state->now), vi_clock_phase(clock, s->state->now),
-                                              approach, 0.0};
+                                              approach, 0.0, 0};
+    if (approach > 0.0) {
+        count_once(s, k);
+    }
+    contact->earlier = 0;
     contact->count += 1;
     contact->last_time = s->state->touch_down[k].time;
     contact->last_phase = s->state->touch_down[k].phase;
@@ -105,7 +116,7 @@ static bool only_touched(const vi_structure *s, int k)
     return true;
 }
 
-/* Is what ends now a touch of rounding size, with neither speed nor impulse? It is no impact. An impulse is known only where
+/* Is a contact, as far as it has come, a touch of rounding size, with neither speed nor impulse? It is no impact. An impulse is known only where
  * the force is integrated in here. */
 static bool is_rounding(const vi_structure *s, int k)
 {
@@ -131,8 +142,11 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
         s->contacts[k].count -= 1;
     } else {
         s->contacts[k].impulse = touch->impulse;
-        vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
-                          vi_max(0.0, now - touch->time - late));
+        count_once(s, k);
+        if (!s->contacts[k].earlier) {
+            vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
+                              vi_max(0.0, now - touch->time - late));
+        }
     }
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
     state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
@@ -161,6 +175,44 @@ void vi_structure_return(const vi_structure *s, int k)
         return;
     }
     vi_structure_touch_down(s, k);
+}
+
+/* ---- what goes on ---- */
+
+void vi_structure_begin_recording(const vi_structure *s)
+{
+    const double now = vi_clock_time(&s->model->clock, s->state->now);
+    s->record->period_impacts = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const bool yields = s->state->status[k] == VI_CONTACT_YIELDING, before = s->state->moved != 0;
+        const bool rests = s->state->status[k] == VI_CONTACT_HELD && s->contacts[k].stick_start <= now;
+        s->contacts[k].earlier = before && (yields || rests);
+        s->state->touch_down[k].counted = before;
+        if (yields && !before && s->state->touch_down[k].velocity > 0.0) {
+            count_once(s, k); /* the start state has pressed it in */
+        }
+    }
+}
+
+void vi_structure_count_contacts(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_YIELDING && !is_rounding(s, k)) {
+            count_once(s, k);
+        }
+    }
+}
+
+bool vi_structure_is_open(const vi_structure *s, int k)
+{
+    const vi_contact *contact = &s->contacts[k];
+    if (!s->record->recording || contact->earlier) {
+        return false;
+    }
+    if (s->state->status[k] == VI_CONTACT_HELD) {
+        return contact->stick_start <= vi_clock_time(&s->model->clock, s->state->now);
+    }
+    return s->state->status[k] == VI_CONTACT_YIELDING && !is_rounding(s, k);
 }
 
 /* ---- on the stop ---- */

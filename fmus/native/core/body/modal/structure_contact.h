@@ -11,6 +11,15 @@
 void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_impulse);
 void vi_structure_release(const vi_structure *s, int k, int leaving);
 
+/* A recording begins: what goes on began before it, unless the motion begins here too. */
+void vi_structure_begin_recording(const vi_structure *s);
+
+/* A period ends: the contacts that have begun in it are counted in it, as far as they are known to be impacts. */
+void vi_structure_count_contacts(const vi_structure *s);
+
+/* Does a rest, or a contact with a stop that yields, go on at contact k that began in the present recording? */
+bool vi_structure_is_open(const vi_structure *s, int k);
+
 /* A compliant stop begins to be pressed in; it ends, and the contact may recede before its surface has come back. */
 void vi_structure_touch_down(const vi_structure *s, int k);
 void vi_structure_separate(const vi_structure *s, int k, bool receding);

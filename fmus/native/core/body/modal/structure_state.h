@@ -67,6 +67,7 @@ typedef struct {
 typedef struct {
     double time, phase, velocity; /* when and how fast it began, s, rad, m/s */
     double impulse;               /* so far, N s */
+    int64_t counted;              /* a period has counted it */
 } vi_touch_down;
 
 /* Model exchange: the importer integrates the modes, and time does not run in here. */
@@ -101,6 +102,7 @@ typedef struct {
     int32_t pending;            /* 0, or the contact (1-based) whose external law must answer */
     int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
     int32_t follow_energies;    /* input: integrate `energies` */
+    int32_t moved;              /* it is no longer at the instant at which its motion began */
     vi_energies energies;
     vi_exchange exchange;
     int64_t series;             /* segments that have been followed by series since a contact came to rest, or nearly ended */

@@ -1,0 +1,149 @@
+"""Which events a recording has: contacts that are open at its end, rests from before it, what happens at time 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, columns_of_points, run_columns
+from vibroimpact.orchestrator.run import PointRunner, named_runner
+from vibroimpact.orchestrator.run.general import GeneralRunner
+from vibroimpact.orchestrator.run.many_points.loop import loop_of
+from vibroimpact.orchestrator.scene import parse_scene
+from vibroimpact.orchestrator.scene.sweep import expand, run_count
+from vibroimpact.orchestrator.study.observation import observation_of
+from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
+
+OPEN_HERTZ = """[body]
+mass = 1.0
+stiffness = 1.0
+damping = 0.08
+[forcing]
+amplitude = 0.6
+angular_frequency = 0.85
+[[stop]]
+law = "hertz"
+position = 0.3
+stiffness = 400.0
+[record]
+recorded_periods = 6
+"""
+"""A touch-down at 44.346592 s with 1.037083 m/s, .005 s before the end: found by an independent code."""
+RESTS = """[body]
+mass = 1.0
+stiffness = {stiffness}
+displacement_start = {position}
+[[stop]]
+position = {position}
+restitution = 0.5
+[record]
+recorded_time = 2.0
+"""
+
+
+def run_of(text: str, values: Mapping[str, float] | None = None, how: str = "fused") -> RunRecord:
+    runner = PointRunner(parse_scene(text, "scene.toml"), execution=how)
+    try:
+        return runner.run(values or {})
+    finally:
+        runner.close()
+
+
+@pytest.mark.parametrize("how", ["fused", "coupled"])
+def test_a_contact_that_is_open_at_the_end_is_an_impact_of_its_period(how: str) -> None:
+    record = run_of(OPEN_HERTZ, how=how)
+    assert record.impacts is not None
+    assert record.periods is not None
+    assert len(record.impacts) == 8
+    assert record.periods[:, 4].sum() == 8
+    time, phase, velocity, impulse, contact, restitution, duration = record.impacts[-1].tolist()
+    assert time == pytest.approx(44.346592, abs=1e-4 if how == "coupled" else 1e-6)
+    assert velocity == pytest.approx(1.037083, abs=1e-3 if how == "coupled" else 1e-6)
+    assert 0.0 <= phase < 2.0 * math.pi
+    assert contact == 1.0
+    assert np.isnan([impulse, restitution, duration]).all()
+    assert np.isfinite(record.impacts[:-1]).all()
+
+
+def test_the_loop_over_points_has_the_open_contacts_of_single_runs() -> None:
+    text = OPEN_HERTZ + '[sweep]\n"stop[1].position" = { values = [0.3, 0.28, 0.25, 0.2] }\n'
+    scene = parse_scene(text, "scene.toml")
+    runner = named_runner(scene, DEFAULT_RUNNER)
+    points = columns_of_points(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
+    ran, _ = run_columns(scene, runner, loop_of(scene, runner), points, None, math.inf)
+    alone = [runner.run({"stop[1].position": value}).impacts for value in (0.3, 0.28, 0.25, 0.2)]
+    runner.close()
+    found = getattr(ran, "impacts", None)
+    assert found is not None
+    np.testing.assert_array_equal(found.rows, np.concatenate([rows for rows in alone if rows is not None]))
+    assert np.isnan(found.rows[:, 6]).any()
+
+
+def test_the_ways_of_accuracy_compare_the_open_contact_too() -> None:
+    scene = parse_scene(OPEN_HERTZ, "scene.toml")
+    coupled, integrated = CoupledTrial(scene, "3.0"), ModelExchangeTrial(scene, 1e-8)
+    reference = observation_of(run_of(OPEN_HERTZ))
+    try:
+        for trial in (coupled, integrated):
+            assert trial.run().impacts == pytest.approx(reference.impacts, abs=1e-2)
+    finally:
+        coupled.close()
+        integrated.close()
+
+
+@pytest.mark.parametrize("how", ["fused", "coupled"])
+@pytest.mark.parametrize("law", ["restitution = 0.5", 'law = "kelvin_voigt"\nstiffness = 100.0'])
+def test_what_happens_where_the_motion_begins_belongs_to_its_recording(law: str, how: str) -> None:
+    start = "[body]\nmass = 1.0\nstiffness = 1.0\ndisplacement_start = 0.2\nvelocity_start = 1.0\n"
+    stop = f"[[stop]]\nposition = 0.2\n{law}\n[record]\nrecorded_time = 3.0\n"
+    record = run_of(start + stop, how=how)
+    assert record.impacts is not None
+    assert record.impacts[0, [0, 2]].tolist() == pytest.approx([0.0, 1.0], abs=1e-12)
+
+
+def test_a_rest_that_lasts_since_before_the_recording_is_no_event_of_it() -> None:
+    text = RESTS.format(stiffness=1.0, position=-0.3)
+    first = run_of(text)
+    assert first.sticks == pytest.approx(np.array([[0.0, math.nan, 1.0]]), nan_ok=True)
+    later = run_of(text.replace("[record]", "[record]\ntransient_time = 1.0"))
+    assert later.sticks is not None
+    assert len(later.sticks) == 0
+    assert later.outcome is Outcome.stuck  # it rests all the same
+
+
+@pytest.mark.parametrize(("stiffness", "position"), [(0.0, 0.3), (0.0, 0.0), (1.0, 0.0)])
+def test_a_rest_without_load_is_not_told_as_pressed(stiffness: float, position: float) -> None:
+    text = RESTS.format(stiffness=stiffness, position=position)
+    record = run_of(text)
+    assert (record.outcome, record.message) == (Outcome.ok, "rests on stop[1] without load")
+    pressed = run_of(RESTS.format(stiffness=1.0, position=-0.3))
+    assert (pressed.outcome, pressed.message) == (Outcome.stuck, "")
+
+
+@pytest.mark.parametrize("law", ["restitution = 0.8", 'law = "kelvin_voigt"\nstiffness = 1e4'])
+def test_a_pair_that_touches_and_approaches_at_time_0_has_its_event(law: str) -> None:
+    text = f"""[component.a]
+fmu = "Oscillator"
+parameters = {{ stiffness = 0.0, velocity_start = 2.0 }}
+[component.b]
+fmu = "Oscillator"
+parameters = {{ mass = 2.0, stiffness = 0.0, velocity_start = -0.5 }}
+[[contact]]
+between = ["a", "b"]
+{law}
+[record]
+recorded_time = 0.3
+[execution]
+macro_step = 1e-2
+"""
+    for transient, expected in ((0.0, [[0.0, 0.0, 1.0]]), (0.2, [])):
+        own = text.replace("[record]", f"[record]\ntransient_time = {transient}")
+        runner = GeneralRunner(parse_scene(own, "pair.toml"))
+        events = runner.run({}).events
+        runner.close()
+        assert events is not None
+        assert events.tolist() == expected
