@@ -180,10 +180,10 @@ def _lengths(impacts: list[Impact], interval: float) -> tuple[Floats, Floats]:
 def _generalized(columns: Floats, target: Floats, covariance: Floats) -> tuple[Floats, Floats, float]:
     """Return the generalized least-squares solution, its covariance, and the sum of squares in standard errors."""
     root = np.linalg.cholesky(covariance)
-    columns, target = np.asarray(np.linalg.solve(root, columns)), np.asarray(np.linalg.solve(root, target))
-    solution: Floats = np.linalg.lstsq(columns, target, rcond=None)[0]
-    uncertain: Floats = np.linalg.inv(columns.T @ columns)
-    return solution, uncertain, float(np.sum((target - columns @ solution) ** 2))
+    scaled, aim = np.linalg.solve(root, columns), np.linalg.solve(root, target)
+    solution: Floats = np.linalg.lstsq(scaled, aim, rcond=None)[0]
+    uncertain: Floats = np.linalg.inv(scaled.T @ scaled)
+    return solution, uncertain, float(np.sum((aim - scaled @ solution) ** 2))
 
 
 def _by_chance(square: float, freedom: int, probability: float = _SELDOM) -> bool:

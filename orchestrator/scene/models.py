@@ -371,8 +371,8 @@ class Execution(SceneTable):
             "0 < tolerance <= 0.01",
             hint="It is the relative error of the speed after one contact with a hertz or hunt_crossley stop.",
             fmu="contact_tolerance",
-            doc="relative error of the speed after one contact with a hertz or hunt_crossley stop, which is integrated; "
-            "errors of contacts add up; the other laws are exact; not in general scenes",
+            doc="relative error of the speed after one contact with a hertz or hunt_crossley stop, which is "
+            "integrated; errors of contacts add up; the other laws are exact; not in general scenes",
             default="1e-10",
         ),
     ] = None
