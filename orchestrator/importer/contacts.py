@@ -150,7 +150,8 @@ class ContactBonds:
 
     def remarks(self) -> list[str]:
         """What a reader of the results must know of held forces, and of bodies at rest on each other."""
-        return [text for text in (bond.remark() for bond in (*self.held, *self.pairs.pairs)) if text]
+        told = [*(bond.remark() for bond in self.held), *(pair.remark() for pair in self.pairs.pairs)]
+        return [text for text in told if text]
 
     def free(self) -> None:
         """Give back what they have saved."""

@@ -11,6 +11,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,9 @@ def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return rows[np.argsort(time, kind="stable")] if (np.diff(time) < 0.0).any() else rows
 
 
-def open_contacts(touch_downs: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDArray[np.float64]:
+def open_contacts(
+    touch_downs: NDArray[np.float64], contacts: NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
     """Return the impacts of contacts that are open, shape (n, 7): impulse, restitution and duration are NaN.
 
     Parameters
