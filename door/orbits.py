@@ -218,7 +218,9 @@ def basins(
     -------
     xarray.Dataset
         `basin` on (velocity_start, displacement_start): numbers along `attractor`, -1 undecided, -2 beyond a stop; of
-        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, and its states at forcing phase 0.
+        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, its states at forcing phase 0, and
+        `attractor_impacts` in a forcing period at each stop. The attribute `undetected_share_below` is the share of
+        starts that may end on an attractor which the sample of chaotic starts missed (95 % confidence).
 
     Raises
     ------
