@@ -122,7 +122,8 @@ def follow(
     -------
     xarray.Dataset
         Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
-        `second`, each is an orbit at a bifurcation, where there are any.
+        `second`, each is an orbit at a bifurcation, where there are any. The attributes `curves` and `not_looked_for`
+        say on which branch each curve was found, and what was not looked for.
 
     Raises
     ------
