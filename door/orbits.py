@@ -122,7 +122,8 @@ def follow(
     -------
     xarray.Dataset
         Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
-        `second`, each is an orbit at a bifurcation, where there are any.
+        `second`, each is an orbit at a bifurcation, where there are any. The attributes `curves` and `not_looked_for`
+        say on which branch each curve was found, and what was not looked for.
 
     Raises
     ------
@@ -218,7 +219,9 @@ def basins(
     -------
     xarray.Dataset
         `basin` on (velocity_start, displacement_start): numbers along `attractor`, -1 undecided, -2 beyond a stop; of
-        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, and its states at forcing phase 0.
+        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, its states at forcing phase 0, and
+        `attractor_impacts` in a forcing period at each stop. The attribute `undetected_share_below` is the share of
+        starts that may end on an attractor which the sample of chaotic starts missed (95 % confidence).
 
     Raises
     ------

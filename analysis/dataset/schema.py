@@ -55,6 +55,7 @@ class SpecialOrbit(IntEnum):
     torus = 3
     graze = 4
     graze_between_impacts = 5
+    stability_change = 6
 
 
 class OrbitClass(IntEnum):

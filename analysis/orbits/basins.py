@@ -8,13 +8,24 @@ starts, then of some of those that come near to none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.analysis.orbits.chaotic_groups import (
+    BLOCK,
+    BLOCKS,
+    LEAST_AGREEING,
+    MOST_BLOCKS,
+    NO_GROUPS,
+    Blocks,
+    Feature,
+    grouped,
+    merged,
+)
 from vibroimpact.analysis.orbits.classify import RunClass
 
 Floats = NDArray[np.float64]
@@ -38,6 +49,8 @@ SETTLING, MOST_SETTLING, SETTLED = 64, 30, 1e-13
 """Rounds after which an attractor's state is looked at again, how often, and the change that is none."""
 PROBES, PROBE_PERIODS = 24, 400
 """Starts at that distance, and forcing periods in which they must come back."""
+MISSED = 0.05
+"""Probability with which a sample may show no start of a share that it is said to exclude."""
 SAME = 1e-5
 """Distance over the size of the motion at which two attractors are one."""
 
@@ -68,6 +81,9 @@ class Flow(Protocol):
     ) -> tuple[list[RunClass], Floats]:
         """Return what a run from each state is after so many forcing periods, and its last states."""
 
+    def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
+        """Return the features of the impacts in consecutive blocks of forcing periods, from forcing phase 0 on."""
+
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
@@ -80,16 +96,28 @@ class Attractor:
         At forcing phase 0; none of chaos.
     radius : float
         Distance, over the size of the motion, from which starts were seen to come back.
+    impacts : array, shape (stop,)
+        Mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter; NaN where they are
+        without number.
+    is_one : bool
+        False of chaotic motion that may lie on several attractors, which were not told apart.
     """
 
     kind: RunClass
     states: Floats
     radius: float
+    impacts: Floats
+    is_one: bool = True
 
     @property
     def is_chaotic(self) -> bool:
         """Whether it has no period."""
         return self.kind.kind is OrbitClass.chaos
+
+    @property
+    def name(self) -> str:
+        """`P(p,q)`, `no impacts`, `chaos` ...; `chaotic, not told apart` where it may be several."""
+        return self.kind.name if self.is_one else "chaotic, not told apart"
 
 
 Told = Callable[["Basins"], None]
@@ -109,6 +137,9 @@ class Basins:
     attractors : list of Attractor
     told_by_sample : int
         Starts that count as chaotic because a sample of them was.
+    undetected_share_below : float
+        Share of the possible starts that may end elsewhere without one of them in that sample: more have a start in it
+        with a probability of 95 %.
     """
 
     starts: Floats
@@ -116,11 +147,12 @@ class Basins:
     scale: Floats
     attractors: list[Attractor] = field(default_factory=list)
     told_by_sample: int = 0
+    undetected_share_below: float = 0.0
 
     @property
     def names(self) -> list[str]:
         """Of the attractors: those of one kind with letters."""
-        plain = [each.kind.name for each in self.attractors]
+        plain = [each.name for each in self.attractors]
         return [
             f"{name} {_letter(plain[:place].count(name))}" if plain.count(name) > 1 else name
             for place, name in enumerate(plain)
@@ -183,6 +215,9 @@ class _Search:
         self._draw, self._told = draw, told
         self._now = basins.starts.copy()
         self._lost = np.zeros(len(self._now), np.bool_)
+        # of chaotic runs: their features, groups, and the number of each group's attractor
+        self._features = np.empty((0, 0))
+        self._groups, self._numbers = NO_GROUPS, np.empty(0, np.int16)
 
     def run(self) -> None:
         self._look(self._left(), FIRST_SAMPLE, first=True)
@@ -240,7 +275,7 @@ class _Search:
         for kind, state in zip(kinds, states, strict=True):
             if kind.kind is OrbitClass.chaos:
                 if not any(each.is_chaotic for each in self._basins.attractors):
-                    self._basins.attractors.append(Attractor(kind, np.empty((0, state.size)), 0.0))
+                    self._basins.attractors.append(self._chaotic(self._impacts(state, BLOCK)))
             elif kind.kind is not OrbitClass.unknown and np.isfinite(state).all():
                 self._add(kind, state)
 
@@ -255,7 +290,14 @@ class _Search:
         states = np.array(rounds)
         radius = self._tried(states)
         if radius > 0.0:
-            self._basins.attractors.append(Attractor(kind, states, radius))
+            impacts = self._impacts(states[0], len(states))
+            if kind.kind is OrbitClass.sticking:
+                impacts = np.full_like(impacts, np.nan)
+            self._basins.attractors.append(Attractor(kind, states, radius, impacts))
+
+    def _impacts(self, state: Floats, periods: int) -> Floats:
+        """Return the mean number of impacts in a forcing period at each stop."""
+        return np.asarray(self._flow.measure(state[None], periods, 1).features[0, 0, :, Feature.impacts])
 
     def _settled(self, state: Floats, periods: int) -> Floats:
         """Return the state once it no longer changes from round to round, or after many."""
@@ -287,6 +329,8 @@ class _Search:
             radius /= 4.0
         return 0.0
 
+    # ---- chaos ----
+
     def _take_for_chaos(self) -> None:
         """Take what is left for chaotic, where all of a sample of it is."""
         chaotic = [n for n, each in enumerate(self._basins.attractors) if each.is_chaotic]
@@ -294,13 +338,77 @@ class _Search:
         if not (chaotic and left.size):
             return
         chosen = self._draw.choice(left, min(CHAOS_SAMPLE, left.size), replace=False)
-        kinds, _ = self._flow.classes(self._now[chosen], TRANSIENT_OF_CHAOS)
+        kinds, states = self._flow.classes(self._now[chosen], TRANSIENT_OF_CHAOS)
         is_chaos = np.array([kind.kind is OrbitClass.chaos for kind in kinds])
         if is_chaos.all():
-            self._basins.told_by_sample += int(left.size - chosen.size)
-            self._basins.labels[left] = chaotic[0]
-        elif left.size <= CHAOS_SAMPLE:
-            self._basins.labels[chosen[is_chaos]] = chaotic[0]
+            self._share_out(left, chosen, states, chaotic[0])
+        elif left.size <= CHAOS_SAMPLE and is_chaos.any():
+            self._share_out(chosen[is_chaos], chosen[is_chaos], states[is_chaos], chaotic[0])
+
+    def _share_out(
+        self, places: NDArray[np.int64], chosen: NDArray[np.int64], states: Floats, first: int
+    ) -> None:
+        """Give chaotic starts to attractors, told apart by long runs of those chosen, which are at some states."""
+        are_new = len(self._numbers) < 2
+        own = self._grouped(self._flow.measure(states, BLOCK, BLOCKS).features, first)
+        labels = np.zeros(self._basins.labels.size, np.int64)
+        if len(self._numbers) > 1 and places.size > chosen.size:
+            labels[places] = self._told_by_blocks(places)
+            if float((labels[chosen] == own).mean()) < LEAST_AGREEING:
+                if are_new:
+                    self._merge(first)
+                    own = np.zeros_like(own)
+                labels = np.full_like(labels, 0 if are_new else -1)
+        labels[chosen] = own
+        self._basins.labels[places] = np.append(self._numbers, UNDECIDED)[labels[places]]
+        if places.size > chosen.size:
+            self._basins.told_by_sample += int((labels[places] >= 0).sum()) - chosen.size
+            missed = 1.0 - MISSED ** (1.0 / chosen.size)
+            self._basins.undetected_share_below += missed * places.size / self._basins.possible
+
+    def _grouped(self, features: Floats, first: int) -> NDArray[np.int64]:
+        """Return the group of each of some long runs; a group that is new gets an attractor."""
+        if len(self._numbers) > 1:
+            return self._groups.of(features.mean(axis=1).reshape(len(features), -1))
+        earlier = len(self._features)
+        self._features = np.concatenate([self._features.reshape(-1, *features.shape[1:]), features])
+        self._groups = grouped(self._features)
+        known = int(self._groups.labels[0]) if earlier else 0
+        self._numbers = np.full(len(self._groups.means), first, np.int16)
+        for group, each in enumerate(self._impacts_of_groups()):
+            if group != known:
+                self._numbers[group] = len(self._basins.attractors)
+                self._basins.attractors.append(self._chaotic(each))
+            else:
+                self._basins.attractors[first] = self._chaotic(each)
+        return self._groups.labels[earlier:]
+
+    def _merge(self, first: int) -> None:
+        """Take groups that single blocks do not tell for one."""
+        self._groups, self._numbers = merged(self._groups), self._numbers[:1]
+        chaotic = [each for each in self._basins.attractors if each.is_chaotic]
+        self._basins.attractors[:] = [each for each in self._basins.attractors if not each.is_chaotic]
+        self._basins.attractors.insert(first, replace(chaotic[0], is_one=False))
+
+    def _chaotic(self, impacts: Floats) -> Attractor:
+        state = np.empty((0, self._now.shape[1]))
+        return Attractor(RunClass(OrbitClass.chaos), state, 0.0, impacts, self._groups.is_sure)
+
+    def _impacts_of_groups(self) -> Floats:
+        means = self._groups.means
+        return means.reshape(len(means), -1, len(Feature))[..., Feature.impacts]
+
+    def _told_by_blocks(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the group of each start by its own impacts; -1 of one that fits none for long."""
+        labels = np.full(places.size, -1, np.int64)
+        for _ in range(MOST_BLOCKS):
+            left = np.flatnonzero((labels < 0) & ~self._lost[places])
+            for part in np.array_split(left, max(1, -(-left.size // self._block))):
+                if part.size:
+                    found = self._flow.measure(self._now[places[part]], BLOCK, 1)
+                    self._now[places[part]], self._lost[places[part]] = found.states, ~found.well
+                    labels[part] = self._groups.of(found.features.reshape(part.size, -1))
+        return np.where(self._lost[places], -1, labels)
 
 
 # ---- the border ----

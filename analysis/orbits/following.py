@@ -7,7 +7,8 @@ change is narrowed down to rounding by steps of part lengths.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -32,6 +33,10 @@ MOST_TURN = 0.1
 """Change of the branch's direction from point to point, rad, above which a step is tried again, shorter."""
 SHORTEST = 1e-9
 """Step along the branch, over the longest, below which it is given up."""
+STABILITY_CHANGE = "stability change"
+"""Kind of a point where the stability changes for none of the reasons that are looked for, such as a branch point."""
+MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2}
+"""Multipliers that pass the unit circle at a point of each kind."""
 LOCATED = 1e-13
 """Width of a bracket, over the step along the branch, at which a point counts as found."""
 
@@ -106,8 +111,8 @@ class SpecialPoint:
     Attributes
     ----------
     kind : str
-        `fold`, `period doubling`, `torus`, `graze` (an impact of no speed) or `graze between impacts`, beyond which
-        the orbit would pass through a stop.
+        `fold`, `period doubling`, `torus`, `graze` (an impact of no speed), `graze between impacts`, beyond which
+        the orbit would pass through a stop, or `stability change`, of which no cause was found.
     at : BranchOrbit
     place : int
         Orbit of the branch that comes next.
@@ -142,6 +147,11 @@ class Branch:
     def name(self) -> str:
         """P(p,q)."""
         return self.orbits[0].orbit.name
+
+    @property
+    def full_name(self) -> str:
+        """P(p,q), and where its impacts are if the body has several stops."""
+        return self.orbits[0].orbit.full_name
 
     @property
     def values(self) -> Floats:
@@ -222,9 +232,8 @@ class Follower:
                 branch.orbits.append(taken)
                 yield taken
                 continue
-            events = sorted(self._events(now, taken, step), key=lambda pair: pair[0])
-            for _, kind, at in events:
-                if kind not in at.tests:
+            for _, kind, at in self._events_in_order(now, taken, step):
+                if kind not in at.tests and kind != STABILITY_CHANGE:
                     branch.ends.append(kind)
                     if at is not now:
                         branch.orbits.append(at)
@@ -304,6 +313,31 @@ class Follower:
 
     # ---- what happens on the way ----
 
+    def _events_in_order(
+        self, now: BranchOrbit, taken: BranchOrbit, step: float
+    ) -> list[tuple[float, str, BranchOrbit]]:
+        """Return what happens in a step; a change of stability that nothing of it explains is an event as well."""
+        events = list(self._events(now, taken, step))
+        if not is_explained(now.orbit, taken.orbit, [kind for _, kind, _ in events]):
+            events.append(self._stability_change(now, taken, step))
+        return sorted(events, key=lambda event: event[0])
+
+    def _stability_change(
+        self, now: BranchOrbit, taken: BranchOrbit, step: float
+    ) -> tuple[float, str, BranchOrbit]:
+        """Return where along a step the stability changes, as near as orbits are found there."""
+        same, changed, at = 0.0, step, taken
+        while changed - same > LOCATED * step:
+            middle = 0.5 * (same + changed)
+            found = self._step(now, middle)
+            if found is None:
+                break
+            if found[0].orbit.is_stable == now.orbit.is_stable:
+                same = middle
+            else:
+                changed, at = middle, found[0]
+        return changed, STABILITY_CHANGE, at
+
     def _events(
         self, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> Iterator[tuple[float, str, BranchOrbit]]:
@@ -346,6 +380,23 @@ class Follower:
             return None
         found = self._step(now, part) if part > 0.0 and not lost else None
         return None if found is None else (part, found[0])
+
+
+def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:
+    """Say whether the stability of two orbits is the same, or points of some kinds between them change it.
+
+    Each point moves as many multipliers over the unit circle as its kind says, outwards or inwards. A graze explains
+    any change: multipliers have no bound next to it.
+    """
+    if before.is_stable == after.is_stable or "graze" in kinds:
+        return True
+    moved = [MULTIPLIERS_OF[kind] for kind in kinds if kind in MULTIPLIERS_OF]
+    outside = [int((np.abs(each.multipliers) >= 1.0).sum()) for each in (before, after)]
+    change = outside[1] - outside[0]
+    return any(
+        change == sum(way * count for way, count in zip(ways, moved, strict=True))
+        for ways in itertools.product((-1, 1), repeat=len(moved))
+    )
 
 
 def _test_of(kind: str) -> Callable[[BranchOrbit], float]:

@@ -68,12 +68,15 @@ class Locus:
         Points of codimension 2: `graze` or `graze between impacts` on a locus of another kind; `another`, a second
         graze between impacts.
     ends : list of str
+    origin : str
+        Branch and point that it was begun from.
     """
 
     kind: str
     points: list[LocusPoint] = field(default_factory=list)
     special: list[tuple[str, LocusPoint]] = field(default_factory=list)
     ends: list[str] = field(default_factory=list)
+    origin: str = ""
 
 
 class LocusFollower:
@@ -315,6 +318,7 @@ def joined_loci(backward: Locus, forward: Locus) -> Locus:
         backward.points[::-1] + forward.points[1:],
         backward.special[::-1] + forward.special,
         backward.ends + forward.ends,
+        forward.origin,
     )
 
 

@@ -58,6 +58,17 @@ class PeriodicOrbit:
         """P(p,q)."""
         return f"P({self.phases.size},{self.periods})"
 
+    @property
+    def full_name(self) -> str:
+        """P(p,q), and where its impacts are if the body has several stops: `P(1,1) at stop 2`."""
+        if len(self.body.contacts) < 2:
+            return self.name
+        stops, counts = np.unique(self.contacts + 1, return_counts=True)
+        if stops.size == 1:
+            return f"{self.name} at stop {stops[0]}"
+        parts = (f"{count} at stop {stop}" for stop, count in zip(stops, counts, strict=True))
+        return f"{self.name}, {', '.join(parts)}"
+
     @cached_property
     def _motion(self) -> tuple[Floats, Floats]:
         return self.body.kernel.motion(self.contacts, self.phases, self.periods, self.velocities)

@@ -120,11 +120,29 @@ def _say_rest(found: Basins, data: xr.Dataset) -> None:
         say(f"{100.0 * undecided:.3g} % of the starts came near to no attractor that is known.")
     if found.told_by_sample:
         say(
-            f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were."
+            f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were. Such a "
+            f"sample may miss an attractor with up to {100.0 * found.undetected_share_below:.2g} % of the starts "
+            "(95 % confidence)."
         )
+    _say_chaotic(found)
     share, dimension = float(data["border_fraction"]), float(data["border_dimension"])
     if np.isfinite(dimension):
         error = float(data["border_dimension_error"])
         say(f"{100.0 * share:.3g} % lie on a border, whose dimension is {dimension:.3f} +- {error:.3f}.")
     elif share > 0.0:
         say(f"{100.0 * share:.3g} % lie on a border.")
+
+
+def _say_chaotic(found: Basins) -> None:
+    """Print what tells chaotic attractors apart, or that they are not told apart."""
+    chaotic = [
+        (name, each) for name, each in zip(found.names, found.attractors, strict=True) if each.is_chaotic
+    ]
+    for name, each in chaotic:
+        if not each.is_one:
+            say(
+                "Chaotic runs differ by more than their own scatter: there may be several chaotic attractors."
+            )
+        elif len(chaotic) > 1:
+            rates = ", ".join(f"{rate:.3g} at stop {stop}" for stop, rate in enumerate(each.impacts, start=1))
+            say(f"{name}: impacts in a forcing period: {rates}.")

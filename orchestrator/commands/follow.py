@@ -13,7 +13,7 @@ import typer
 from vibroimpact.analysis.dataset import open_dataset, write_dataset
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.orbits import OrbitError
-from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, FollowSettings
+from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit, FollowSettings
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
@@ -28,6 +28,9 @@ from vibroimpact.orchestrator.orbits.follow import (
     follow_loci,
 )
 from vibroimpact.orchestrator.ssp import opened_scene
+
+EXACT_DIGITS, UNEXPLAINED_DIGITS = 11, 6
+"""Digits of the value of a special point: of one that is a zero of a test, and of one that only a bracket holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +144,7 @@ def _print(followed: Followed) -> None:
         *("<orbit", "<what happens", f">{followed.parameter}", "<impact velocities", "<largest multipliers"),
     )
     for number, branch in enumerate(followed.branches, start=1):
-        name = f"{number}  {branch.name}"
+        name = f"{number}  {branch.full_name}"
         for point in branch.points:
             orbit = point.at.orbit
             largest = (
@@ -150,7 +153,8 @@ def _print(followed: Followed) -> None:
                 else ", ".join(multiplier_text(each) for each in orbit.multipliers[:2])
             )
             speeds = ", ".join(f"{speed:.8g}" if speed > 1e-12 else "0" for speed in orbit.velocities)
-            rows.add_row(name, point.kind, f"{point.at.value:.11g}", speeds, largest)
+            digits = UNEXPLAINED_DIGITS if point.kind == STABILITY_CHANGE else EXACT_DIGITS
+            rows.add_row(name, point.kind, f"{point.at.value:.{digits}g}", speeds, largest)
         if not branch.points:
             rows.add_row(name, "nothing", "", "", "")
     wide_terminal().print(rows)
@@ -158,23 +162,37 @@ def _print(followed: Followed) -> None:
         stable = sum(each.orbit.is_stable for each in branch.orbits)
         low, high = float(branch.values.min()), float(branch.values.max())
         say(
-            f"{number}  {branch.name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
+            f"{number}  {branch.full_name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
             f"{stable} stable; begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
         )
+    _say_unexplained(followed)
+
+
+def _say_unexplained(followed: Followed) -> None:
+    for number, branch in enumerate(followed.branches, start=1):
+        points = [point for point in branch.points if point.kind == STABILITY_CHANGE]
+        values = [f"{point.at.value:.{UNEXPLAINED_DIGITS}g}" for point in points]
+        if values:
+            say(
+                f"{number}  {branch.full_name}: stability changes at {', '.join(values)}, and no cause was found. "
+                "Another branch may cross there (a branch point): it is not followed."
+            )
 
 
 def _print_loci(loci: FollowedLoci) -> None:
     first, second = loci.followed.parameter, loci.second
-    for number, locus in enumerate(loci.loci, start=1):
+    for name, locus in zip(loci.names, loci.loci, strict=True):
         rows = np.array([each.values for each in locus.points])
         low, high = rows.min(axis=0), rows.max(axis=0)
         say(
-            f"{number}  {locus.kind} of {locus.points[0].orbit.name}: {counted(len(rows), 'orbit')}, "
+            f"{name}: {counted(len(rows), 'orbit')}, "
             f"{first} from {low[0]:.8g} to {high[0]:.8g}, {second} from {low[1]:.8g} to {high[1]:.8g}; "
             f"ends: {', '.join(locus.ends)}."
         )
         for kind, point in locus.special:
             say(f"   codimension 2, {locus.kind} and {kind}: {point.values[0]:.11g}, {point.values[1]:.11g}")
+    if loci.second:
+        say(loci.left_out)
 
 
 def _write(followed: Followed | FollowedLoci, output: Path | None, figure: Path | None) -> None:

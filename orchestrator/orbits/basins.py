@@ -208,6 +208,12 @@ def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basi
             "1",
             "distance from which starts were seen to come back, over the size of the motion",
         ),
+        "attractor_impacts": (
+            ("attractor", "stop"),
+            np.array([each.impacts for each in found.attractors]).reshape(-1, len(scene.stops)),
+            "1",
+            "mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter",
+        ),
         "border_fraction": ((), share, "1", "share of the starts next to one that ends elsewhere"),
         "border_dimension": (
             (),
@@ -237,6 +243,7 @@ def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basi
             "units_system": scene.units,
             "decided": found.decided,
             "chaotic_by_sample": found.told_by_sample,
+            "undetected_share_below": found.undetected_share_below,
         }
     )
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns, joined
 from vibroimpact.analysis.orbits.basins import Ends, Floats
+from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
@@ -32,6 +33,9 @@ SLICE = 0.25
 """Time after which a thread looks whether it is still wanted, s: Ctrl-C waits no longer than that and one run."""
 DEADLINE = 20.0
 """Longest time of one run, s: one that takes longer counts as one whose end is not known."""
+_PHASE, _VELOCITY, _CONTACT = (
+    IMPACT_COLUMNS.index(f"impact_{name}") for name in ("phase", "velocity", "contact")
+)
 _RECORD = {"transient_periods": 0, "recorded_periods": 1, "impacts": False}
 
 
@@ -59,6 +63,7 @@ class BodyFlow:
         self._runners: list[PointRunner] = []
         self._bare = [self._loop(bare) for _ in range(count)]
         self._telling = [self._loop(told) for _ in range(count)]
+        self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
         self.names = start_names(scene)
 
     def _loop(self, record: dict[str, Any]) -> PointLoop:
@@ -83,10 +88,9 @@ class BodyFlow:
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
         """Return where states are after some forcing periods: see `analysis.orbits.basins.Flow`."""
         columns = self._run(self._bare, states, (0, periods), first=first)
-        outcome = np.concatenate([each.outcome for each in columns])
         return Ends(
             np.concatenate([_final(each) for each in columns]),
-            (outcome == Outcome.ok) | (outcome == Outcome.stuck),
+            np.concatenate([_went_well(each) for each in columns]),
         )
 
     def classes(
@@ -96,6 +100,23 @@ class BodyFlow:
         columns = self._run(self._telling, states, (transient, RECORDED), first=first)
         found = [kind for each in columns for kind in _classes(each)]
         return found, np.concatenate([_final(each) for each in columns])
+
+    def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
+        """Return features of impacts in consecutive blocks: see `analysis.orbits.basins.Flow`."""
+        features, well = [], np.ones(len(states), np.bool_)
+        for _ in range(blocks):  # one after the other, so that few impacts are in memory
+            columns = self._run(self._measuring, states, (0, periods), first=False)
+            features.append(np.concatenate([self._features(each, periods) for each in columns]))
+            states = np.concatenate([_final(each) for each in columns])
+            well &= np.concatenate([_went_well(each) for each in columns])
+        return Blocks(np.stack(features, axis=1), states, well)
+
+    def _features(self, columns: RunColumns, periods: int) -> Floats:
+        assert columns.impacts is not None
+        owner, rows = np.repeat(np.arange(len(columns)), columns.impacts.count), columns.impacts.rows
+        impacts = rows[:, _PHASE], rows[:, _VELOCITY], rows[:, _CONTACT].astype(np.int64) - 1
+        shape = len(columns), 1, len(self.scene.stops)
+        return block_features(owner, np.zeros_like(owner), impacts, shape, periods)[:, 0]
 
     def _run(
         self, loops: Sequence[PointLoop], states: Floats, periods: tuple[int, int], *, first: bool
@@ -147,6 +168,10 @@ class BodyFlow:
             one.forced,
             one.periods,
         )
+
+
+def _went_well(columns: RunColumns) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    return np.isin(columns.outcome, (Outcome.ok, Outcome.stuck))
 
 
 def _final(columns: RunColumns) -> Floats:

@@ -112,8 +112,39 @@ class FollowedLoci:
             coordinates=names,
             unit_of={name: cf_unit(scene, key) or "1" for name, key in zip(names, keys, strict=True)},
             units=scene.units,
-            attrs=self.followed.attributes | {"second_parameter": self.second},
+            attrs=self.followed.attributes
+            | {
+                "second_parameter": self.second,
+                "curves": "\n".join(self.names),
+                "not_looked_for": self.left_out,
+            },
         )
+
+    @property
+    def names(self) -> list[str]:
+        """What each curve is, and the branch on which it was found."""
+        return [
+            f"{number}  {locus.kind} of {locus.points[0].orbit.full_name}; begun from {locus.origin}"
+            for number, locus in enumerate(self.loci, start=1)
+        ]
+
+    @property
+    def left_out(self) -> str:
+        """What was not looked for, as a sentence."""
+        scene, points = (
+            self.followed.scene,
+            [point for each in self.followed.branches for point in each.points],
+        )
+        said = (
+            f"Curves were begun only where a branch has a {', '.join(FOLLOWED_KINDS[:-1])} or {FOLLOWED_KINDS[-1]} at "
+            f"{self.second} = {scene.value(self.second):g}: others, and those that leave points of codimension 2, were "
+            f"not looked for. Begin at other values of {self.second} to find more."
+        )
+        others = [point for point in points if point.kind not in FOLLOWED_KINDS]
+        if others:
+            where = ", ".join(f"{point.kind} at {point.at.value:.8g}" for point in others)
+            said += f" Not followed: {where}."
+        return said
 
 
 def follow_loci(
@@ -151,11 +182,12 @@ def follow_loci(
     follower = LocusFollower(
         lambda *both: impacting_body(scene.at(dict(zip(keys, both, strict=True)))), first, second
     )
-    for branch in result.followed.branches:
+    for number, branch in enumerate(result.followed.branches, start=1):
         for point in branch.points:
             if point.kind not in FOLLOWED_KINDS or _is_on(result.loci, point, value, first, second):
                 continue
-            ways = Locus(point.kind), Locus(point.kind)
+            origin = f"branch {number}, {branch.full_name}, at {point.at.value:.8g}"
+            ways = Locus(point.kind, origin=origin), Locus(point.kind, origin=origin)
             try:
                 for way, sign in zip(ways, (-1.0, 1.0), strict=True):
                     for _ in follower.walk(way, point.at, (point.at.value, value), sign):
@@ -246,7 +278,7 @@ def follow_branches(
 
 def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed, told: Told) -> None:
     """Follow an orbit both ways; what is there when it is interrupted is kept."""
-    origin = f"{orbit.name} at {value:g}"
+    origin = f"{orbit.full_name} at {value:g}"
     ways = Branch(origin), Branch(origin)
     try:
         for way, sign in zip(ways, (-1.0, 1.0), strict=True):
@@ -268,7 +300,7 @@ def _doubled(follower: Follower, result: Followed, doublings: int, told: Told) -
                     result.branches, point.at, follower.settings
                 ):
                     continue
-                child = Branch(f"{parent.name} at its period doubling {point.at.value:.11g}")
+                child = Branch(f"{parent.full_name} at its period doubling {point.at.value:.11g}")
                 result.branches.append(child)
                 try:
                     for each in follower.leave(child, point):

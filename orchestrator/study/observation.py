@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.analysis.dataset.schema import OrbitClass
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +49,9 @@ class Observation:
         Why there is no result, or what is wrong with it; empty where it is one.
     variance : float
         Least variance accounted for among the channels that a replay is compared with, percent; else NaN.
+    held : OrbitClass
+        `sticking` where impacts are without number (a complete chatter, or a rest on a stop), `rest` where the body
+        rests for good, else `unknown`; the class of the run goes by it.
     """
 
     impacts: Floats = field(default_factory=_no_impacts)
@@ -61,6 +65,7 @@ class Observation:
     seconds: float = math.nan
     failure: str = ""
     variance: float = math.nan
+    held: OrbitClass = OrbitClass.unknown
 
     @property
     def displacement_range(self) -> float:
@@ -92,5 +97,18 @@ def observation_of(record: RunRecord) -> Observation:
     samples = None if record.samples is None else record.samples[:, 1:]
     final = (record.final_displacement, record.final_velocity)
     return Observation(
-        impacts, lowest, highest, final, residual, samples=samples, seconds=record.seconds, failure=failure
+        *(impacts, lowest, highest, final, residual),
+        samples=samples,
+        seconds=record.seconds,
+        failure=failure,
+        held=_held(record),
     )
+
+
+def _held(record: RunRecord) -> OrbitClass:
+    """Return whether a run rests for good, or has impacts without number: as `classify` takes it."""
+    if record.outcome == Outcome.stuck:
+        return OrbitClass.rest
+    sticks = record.sticks is not None and len(record.sticks) > 0
+    chatters = record.periods is not None and bool(np.isinf(record.periods[:, 4]).any())
+    return OrbitClass.sticking if sticks or chatters else OrbitClass.unknown

@@ -1,9 +1,13 @@
-"""The class of an orbit: P(p,q), p impacts in q forcing periods."""
+"""The class of an orbit: P(p,q), p impacts in q forcing periods; P(inf,q) where they are without number."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.orchestrator.study.errors import COMPARED
 from vibroimpact.orchestrator.study.observation import Observation
 
 REPEATS = 1e-6
@@ -14,6 +18,9 @@ LEAST_TURNS = 2
 
 def orbit_of(found: Observation, period: float | None, window: tuple[float, float]) -> str:
     """Return the class of an orbit: `P(p,q)`, `no impacts`, `not periodic in the recording`; nothing where unforced.
+
+    A complete chatter is `P(inf,q)` and a body that rests for good is at `rest`, as `classify` names them. The slowest
+    impacts of a chatter do not tell whether it repeats: their number is the engine's.
 
     Parameters
     ----------
@@ -28,16 +35,24 @@ def orbit_of(found: Observation, period: float | None, window: tuple[float, floa
     >>> train = np.array([[0.3, 1.0, 1.0], [0.9, 0.5, 1.0], [2.3, 1.0, 1.0], [2.9, 0.5, 1.0]])
     >>> orbit_of(Observation(train), 1.0, (0.0, 4.0)), orbit_of(Observation(), 1.0, (0.0, 4.0))
     ('P(2,2)', 'no impacts')
+    >>> orbit_of(Observation(train, held=OrbitClass.sticking), 1.0, (0.0, 4.0))
+    'P(inf,2)'
     """
     if period is None:
         return ""
+    if found.held is OrbitClass.rest:
+        return "rest"
+    is_endless = found.held is OrbitClass.sticking
+    if is_endless:
+        speeds = found.impacts[:, 1]
+        found = replace(found, impacts=found.impacts[speeds > COMPARED * speeds.max(initial=0.0)])
     if not len(found.impacts):
-        return "no impacts"
+        return "P(inf,1)" if is_endless else "no impacts"
     most = round((window[1] - window[0]) / period) // LEAST_TURNS
     for periods in range(1, most + 1):
         if _repeats(found, periods * period, period, window):
             count = np.count_nonzero(found.impacts[:, 0] < window[0] + periods * period)
-            return f"P({count},{periods})"
+            return f"P({'inf' if is_endless else count},{periods})"
     return "not periodic in the recording"
 
 

@@ -44,6 +44,7 @@ _MARKS = {
     SpecialOrbit.torus: "^",
     SpecialOrbit.graze: "o",
     SpecialOrbit.graze_between_impacts: "v",
+    SpecialOrbit.stability_change: "X",
 }
 
 

@@ -11,7 +11,9 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside, unit_symbol
 
-_DOTS: dict[str, Any] = {"marker": ".", "linestyle": "none", "markersize": 1.4, "markeredgewidth": 0.0}
+_DOTS: dict[str, Any] = {"marker": "o", "linestyle": "none", "markeredgewidth": 0.0, "color": "#0F4C81"}
+_SMALLEST, _LARGEST, _ONE, _TENFOLD = 0.9, 4.0, 5.0, 1.05
+"""Diameters of dots, points: limits, that of an only dot, and how much ten times as many take off."""
 _MARKS = "osD^v"
 
 
@@ -24,7 +26,11 @@ def draw_maps(dataset: xr.Dataset) -> Figure:
     else:
         names = ("displacement", "velocity") if dataset.attrs["map"] == "strobe" else ("phase", "velocity")
         axis.plot(
-            *(dataset[name].values for name in names), color="0.6", rasterized=True, label="long run", **_DOTS
+            *(dataset[name].values for name in names),
+            rasterized=True,
+            label="long run",
+            markersize=dot_size(dataset[names[0]].size),
+            **_DOTS,
         )
         if "before_phase" in dataset:
             for which, colour, words in (("before", "#0F4C81", "S"), ("after", "#B5410B", "W")):
@@ -52,6 +58,15 @@ def draw_maps(dataset: xr.Dataset) -> Figure:
     return figure
 
 
+def dot_size(count: int) -> float:
+    """Return the diameter of so many dots, points: few dots are seen, and many do not cover each other.
+
+    >>> [round(dot_size(count), 1) for count in (2, 100, 2752, 200_000)]
+    [4.0, 2.9, 1.4, 0.9]
+    """
+    return float(np.clip(_ONE - _TENFOLD * np.log10(max(count, 1)), _SMALLEST, _LARGEST))
+
+
 def _draw_curve(
     axis: Axes, phase: np.ndarray[Any, Any], speed: np.ndarray[Any, Any], colour: str, words: str
 ) -> None:
@@ -63,7 +78,13 @@ def _draw_curve(
 def _draw_diagram(axis: Axes, dataset: xr.Dataset) -> None:
     name = "rho" if dataset.attrs["map"] == "nordmark" else "d"
     values, states = dataset[name].values, dataset["x"].values
-    axis.plot(np.repeat(values, states.shape[1]), states.ravel(), color="#0F4C81", rasterized=True, **_DOTS)
+    axis.plot(
+        np.repeat(values, states.shape[1]),
+        states.ravel(),
+        rasterized=True,
+        markersize=dot_size(states.size),
+        **_DOTS,
+    )
     axis.margins(x=0.0)
     if name == "d":
         axis.set(xlabel="d (-)", ylabel="x (-)")

@@ -18,16 +18,24 @@ from vibroimpact.analysis.orbits.basins import (
     border_share,
     find_basins,
 )
+from vibroimpact.analysis.orbits.chaotic_groups import Blocks, Feature
 from vibroimpact.analysis.orbits.classify import RunClass
 
 BORDER = 0.3
 
 
 class KnownMap:
-    """A map: starts left of BORDER go to (-1, 0), those between it and 3 to a cycle of two, the others never settle."""
+    """A map: starts left of BORDER go to (-1, 0), those between it and 3 to a cycle of two, the others never settle.
 
-    def __init__(self, *, is_slow: bool = False) -> None:
+    The chaotic starts above y = 0 hit a second stop at a rate of their own; with `bridge`, a share of all changes over.
+    """
+
+    def __init__(
+        self, *, is_slow: bool = False, rates: tuple[float, float] = (0.2, 0.2), bridge: float = 0.0
+    ) -> None:
         self._rate = 0.99 if is_slow else 0.5
+        self._rates, self._bridge = rates, bridge
+        self._draw = np.random.default_rng(5)
         self.followed = 0
 
     def _after(self, states: Floats, periods: int) -> Floats:
@@ -69,6 +77,18 @@ class KnownMap:
                 found.append(RunClass(OrbitClass.no_impacts))
         return found, ends
 
+    def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
+        features = np.zeros((len(states), blocks, 2, len(Feature)))
+        for block in range(blocks):
+            above = (states[:, 1] > 0.0).astype(int)
+            above ^= self._draw.random(len(states)) < self._bridge
+            rate = np.array(self._rates)[above]
+            features[:, block, 0, Feature.impacts] = 1.0
+            features[:, block, 1, Feature.impacts] = self._draw.binomial(periods, rate) / periods
+            features[:, block, 1, Feature.speed] = 2.0 * features[:, block, 1, Feature.impacts]
+        ends = self.follow(states, periods * blocks)
+        return Blocks(features, ends.states, ends.well)
+
 
 def plane(x: Floats, y: Floats) -> Basins:
     states = np.column_stack([np.tile(x, y.size), np.repeat(y, x.size)])
@@ -95,6 +115,43 @@ def test_chaos_is_told_by_a_sample_of_what_is_left() -> None:
     assert found.names == ["chaos"]
     assert (found.labels == 0).all()
     assert found.told_by_sample == 600 - 256
+
+
+CHAOTIC = np.linspace(3.2, 4.8, 60), np.linspace(-1.0, 1.0, 10)
+
+
+def test_a_sample_says_what_share_it_may_have_missed() -> None:
+    found = plane(*CHAOTIC)
+    find_basins(found, KnownMap(), block=1000)
+    missed = found.undetected_share_below
+    assert (1.0 - missed) ** 256 == pytest.approx(0.05)
+    few = plane(CHAOTIC[0][::3], CHAOTIC[1])
+    find_basins(few, KnownMap(), block=1000)
+    assert few.undetected_share_below == 0.0, "all 200 starts have a long run of their own"
+
+
+def test_chaotic_attractors_are_told_apart_by_the_impacts_at_a_stop() -> None:
+    found = plane(*CHAOTIC)
+    find_basins(found, KnownMap(rates=(0.1, 0.9)), block=100)
+    assert found.names == ["chaos a", "chaos b"]
+    assert found.decided == 1.0
+    assert found.fractions == pytest.approx([0.5, 0.5])
+    above = found.labels[found.starts[:, 1] > 0.0]
+    assert len(np.unique(above)) == 1
+    assert found.attractors[above[0]].impacts == pytest.approx([1.0, 0.9], abs=0.01)
+
+
+def test_chaotic_runs_that_differ_but_overlap_are_not_told_apart() -> None:
+    found = plane(*CHAOTIC)
+    find_basins(found, KnownMap(rates=(0.4, 0.5)), block=1000)
+    assert found.names == ["chaotic, not told apart"]
+    assert (found.labels == 0).all()
+
+
+def test_runs_that_change_over_belong_to_one_attractor() -> None:
+    found = plane(*CHAOTIC)
+    find_basins(found, KnownMap(rates=(0.1, 0.9), bridge=0.5), block=1000)
+    assert found.names == ["chaos"]
 
 
 def test_starts_beyond_a_stop_are_left_alone_and_do_not_count() -> None:

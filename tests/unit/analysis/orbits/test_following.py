@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vibroimpact.analysis.orbits import Contact, ImpactingBody, closed_form
-from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings
+from vibroimpact.analysis.orbits import Contact, ImpactingBody, closed_form, find_orbit
+from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings, is_explained
 
 
 def oscillator(frequency: float) -> ImpactingBody:
@@ -62,3 +62,41 @@ def test_the_branch_that_leaves_at_the_doubling_has_its_fold_and_its_graze(
     assert [point.kind for point in doubled.points] == ["fold", "graze"]
     assert doubled.points[0].at.value == pytest.approx(0.9363626913, abs=1e-9)
     assert all(each.orbit.turns == 1 for each in doubled.orbits)
+
+
+def between_two_stops(frequency: float) -> ImpactingBody:
+    one = np.ones(1)
+    stops = Contact(one, 1.0, 1.0, 0.7), Contact(one, -1.0, -1.0, 0.7)
+    return ImpactingBody(one, 0.04 * one, 0.5 * one, 0.0 * one, frequency, 0.0, stops, one)
+
+
+def test_a_change_of_stability_at_a_branch_point_is_said_to_have_no_cause_that_was_found() -> None:
+    follower = Follower(between_two_stops, FollowSettings(0.95, 1.0, longest=0.05))
+    body = between_two_stops(0.99)
+    branch = follower.branch(find_orbit(body, [0.1, 0.1 + np.pi], [0, 1]), 0.99)
+    (point,) = branch.points
+    assert point.kind == "stability change"
+    # the loss of symmetry: a multiplier of half an orbit and its mirror image passes +1
+    assert point.at.value == pytest.approx(0.97282430, abs=2e-6)
+    assert all(each.orbit.is_stable for each in branch.orbits if each.value > point.at.value + 1e-6)
+    assert not any(each.orbit.is_stable for each in branch.orbits if each.value < point.at.value - 1e-6)
+    assert branch.full_name == "P(2,1), 1 at stop 1, 1 at stop 2"
+
+
+def test_no_step_of_a_branch_with_known_causes_has_a_change_of_stability_without_one(branch: Branch) -> None:
+    assert all(point.kind != "stability change" for point in branch.points)
+
+
+def test_a_point_moves_as_many_multipliers_as_its_kind(branch: Branch) -> None:
+    stable = next(each.orbit for each in branch.orbits if each.orbit.is_stable)
+    unstable = next(
+        each.orbit
+        for each in branch.orbits
+        if not each.orbit.is_stable and each.orbit.velocities.min() > 1e-3
+    )
+    assert is_explained(stable, stable, [])
+    assert not is_explained(stable, unstable, [])
+    assert not is_explained(stable, unstable, ["torus"])
+    assert not is_explained(stable, unstable, ["fold", "fold"])
+    for kinds in (["fold"], ["period doubling"], ["fold", "torus"], ["graze"]):
+        assert is_explained(stable, unstable, kinds)

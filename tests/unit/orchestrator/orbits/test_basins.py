@@ -12,6 +12,7 @@ from support.command_line import in_this_process
 from support.places import EXAMPLES
 
 import vibroimpact as vi
+from vibroimpact.analysis.orbits import basins as plane_of_starts
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits import basins as basins_module
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
@@ -114,6 +115,54 @@ def test_attractors_that_are_mirror_images_of_each_other_are_two() -> None:
     assert one == pytest.approx(other, abs=0.02)
 
 
+TWO_CHAOTIC = [
+    {"position": side, "side": name, "restitution": 0.7} for side, name in ((1.0, "upper"), (-1.0, "lower"))
+]
+
+
+@pytest.fixture
+def brief_transients(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let long runs of chaotic starts settle for fewer periods: those of these scenes are settled by then."""
+    monkeypatch.setattr(plane_of_starts, "TRANSIENT_OF_CHAOS", 300)
+
+
+@pytest.mark.usefixtures("brief_transients")
+def test_chaotic_attractors_that_are_mirror_images_of_each_other_are_two() -> None:
+    changes = {"stop": TWO_CHAOTIC, "forcing__angular_frequency": 0.9, "body__damping_ratio": 0.04}
+    of = scene(**changes)
+    found = vi.basins(of, (-1.0, 1.0), (-3.0, 3.0), (40, 40))
+    assert found.attractor_name.values.tolist() == ["chaos a", "chaos b"]
+    assert found.basin_fraction.values == pytest.approx([0.5, 0.5], abs=0.03)
+    often, seldom = found.attractor_impacts.values[0]
+    assert found.attractor_impacts.values == pytest.approx(
+        np.array([[often, seldom], [seldom, often]]), abs=0.02
+    )
+    for x, y in ((0.3, 0.0), (-0.3, 0.0), (0.9, -0.7), (0.5, 0.7), (-0.5, 0.7), (0.0, 1.5)):
+        start = {OSCILLATOR[0]: x, OSCILLATOR[1]: y}
+        run = vi.run(of.with_values({**LONG, **start, "record.recorded_periods": 400}))
+        counts = np.bincount(run.impact_contact.values.astype(int), minlength=3)[1:]
+        at = found.sel(displacement_start=x, velocity_start=y, method="nearest")
+        ends = found.attractor_impacts.values[int(at.basin)]
+        assert (x, y) == (0.9, -0.7) or np.argmax(ends) == np.argmax(counts), (
+            "next to a border a cell is coarse"
+        )
+
+
+@pytest.mark.usefixtures("brief_transients")
+def test_one_chaotic_attractor_stays_one_and_says_what_its_sample_may_have_missed() -> None:
+    stop = [{"position": 0.0, "restitution": 0.8}]
+    changes = {
+        "stop": stop,
+        "forcing__amplitude": 1.0,
+        "forcing__angular_frequency": 2.9,
+        "body__damping_ratio": 0.01,
+    }
+    found = vi.basins(scene(**changes), (-1.0, 0.0), (-2.0, 2.0), (40, 40))
+    assert found.attractor_name.values.tolist() == ["chaos"]
+    assert found.attrs["chaotic_by_sample"] == 1600 - 256
+    assert found.attrs["undetected_share_below"] == pytest.approx(0.0116, abs=2e-4)
+
+
 def test_a_chain_and_a_beam_have_basins_of_one_of_their_parts() -> None:
     chain = scene(CHAIN)
     found = vi.basins(chain, points=(30, 30))
@@ -141,7 +190,8 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
     assert "P(2,2)" in done.stdout
     assert (tmp_path / "b.png").read_bytes()[:4] == b"\x89PNG"
     with xr.open_dataset(tmp_path / "b.nc") as written:
-        assert written.sizes == {"velocity_start": 30, "displacement_start": 40, "attractor": 2, "period": 2}
+        sizes = {"velocity_start": 30, "displacement_start": 40, "attractor": 2, "period": 2, "stop": 1}
+        assert written.sizes == sizes
         assert written.displacement_start.values[[0, -1]].tolist() == [-1.0, 0.9]
 
 

@@ -141,6 +141,71 @@ def test_what_cannot_be_followed_is_one_line(arguments: list[str], said: str) ->
     assert err.count("\n") == 1
 
 
+SYMMETRIC = """
+[body]
+mass = 1.0
+stiffness = 1.0
+damping_ratio = 0.04
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.98
+[[stop]]
+position = 1.0
+restitution = 0.7
+[[stop]]
+side = "lower"
+position = -1.0
+restitution = 0.7
+[record]
+recorded_periods = 8
+"""
+
+
+def test_a_loss_of_symmetry_is_a_change_of_stability_whose_cause_is_not_found(tmp_path: Path) -> None:
+    path, output, figure = tmp_path / "two.toml", tmp_path / "b.nc", tmp_path / "b.png"
+    path.write_text(SYMMETRIC, encoding="utf-8")
+    span = [
+        "--parameter",
+        PARAMETER,
+        "--from",
+        "0.96",
+        "--to",
+        "1",
+        "--step",
+        "0.05",
+        "--seed",
+        "0.1:1,3.24:2",
+    ]
+    code, out, err = in_this_process(["follow", str(path), *span, "-o", str(output), "--figure", str(figure)])
+    assert (code, err) == (0, "")
+    assert "1  P(2,1), 1 at stop 1, 1 at stop 2: stability changes at 0.97282" in out
+    assert "no cause was found" in out
+    with vi.open_dataset(output) as written:
+        runs = written.vibroimpact.runs
+        here = runs["orbit_special"].values == SpecialOrbit.stability_change
+        assert runs["angular_frequency"].values[here] == pytest.approx([0.9728243], abs=2e-6)
+
+
+def test_equal_orbits_at_two_stops_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "two.toml"
+    path.write_text(SYMMETRIC, encoding="utf-8")
+    span = ["--parameter", PARAMETER, "--from", "0.965", "--to", "0.973", "--step", "0.1", "--doublings", "0"]
+    code, out, _ = in_this_process(["follow", str(path), *span, "--set", "forcing.angular_frequency=0.97"])
+    assert code == 0
+    assert "P(1,1) at stop 1" in out
+    assert "P(1,1) at stop 2" in out
+
+
+def test_curves_over_two_numbers_say_on_which_branch_they_begin_and_what_is_left_out(
+    loci: xr.Dataset,
+) -> None:
+    curves = loci.attrs["curves"].splitlines()
+    assert len(curves) == len(np.unique(loci.vibroimpact.runs["orbit_branch"].values))
+    assert all("begun from branch 1, P(1,1), at " in each for each in curves)
+    assert "were not looked for" in loci.attrs["not_looked_for"]
+    assert "forcing.amplitude = 0.5" in loci.attrs["not_looked_for"]
+
+
 def test_what_was_followed_before_ctrl_c_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from vibroimpact.analysis.orbits.following import Follower
 

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import rgb_to_hsv, to_rgb
 from support.command_line import in_this_process
 from support.places import EXAMPLES
 
 import vibroimpact as vi
+from vibroimpact.analysis.figures.orbits.maps import dot_size, draw_maps
 
 SETS = EXAMPLES / "thesis" / "figure_2_12.toml"
 CHAOS = EXAMPLES / "thesis" / "figure_2_11.toml"
@@ -32,6 +34,17 @@ def test_the_impact_map_has_the_impacts_of_the_run_and_the_orbit_on_it() -> None
     assert found.orbit_name.values.tolist() == ["flip saddle P(1,1)"]
     assert found.orbit_phase.values == pytest.approx([orbits[0].phases[0]])
     assert found.orbit_velocity.values == pytest.approx([orbits[0].velocities[0]])
+
+
+def test_dots_are_dark_and_the_fewer_the_larger() -> None:
+    found = vi.maps(scene(ONE))
+    figure = draw_maps(found)
+    (dots,) = [line for line in figure.axes[0].lines if line.get_label() == "long run"]
+    assert rgb_to_hsv(to_rgb(dots.get_color()))[2] < 0.6, "not a grey that is hardly seen"
+    sizes = [dot_size(count) for count in (1, 2, 10, 100, 1000, 10_000, 1_000_000)]
+    assert sizes == sorted(sizes, reverse=True)
+    assert dots.get_markersize() == dot_size(found.phase.size)
+    assert (sizes[1], sizes[-1]) == (4.0, 0.9), "points: a twentieth of an inch, a pixel of 80 to the inch"
 
 
 def test_the_strobe_has_the_states_of_the_run_and_those_of_the_orbits() -> None:
