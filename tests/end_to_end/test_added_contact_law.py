@@ -35,8 +35,8 @@ how = "{how}"
 """
 OSCILLATOR = "mass = 1.0\nstiffness = 1.0\ndamping = 0.0\ndisplacement_start = -2.0"
 CHAIN = "masses = [1.0]\nstiffnesses = [1.0]\ndampings = [0.0]\ndisplacement_start = [-2.0]"
-#: Where 2 = x^2 / 2 + 10 (x - 1)^4 / 4, and the largest of 200 samples a time unit.
-TURNING_POINT, LARGEST_SAMPLE = 1.69106, 1.69101
+#: Largest of 200 samples a time unit, by scipy's DOP853 at 1e-12; the motion turns at 1.6910580, where its energy is 2.
+LARGEST_SAMPLE = 1.6910572632
 
 
 def changed(path: Path, before: str, after: str) -> None:
@@ -94,8 +94,8 @@ def test_a_law_added_as_the_page_says_is_felt_by_every_body(tmp_path: Path) -> N
         assert ran.returncode == 0, ran.stderr
         with open_dataset(results) as dataset:
             largest = float(dataset.vibroimpact.samples().displacement.max())
-        assert abs(largest - LARGEST_SAMPLE) < 1e-5
-        assert largest < TURNING_POINT
+        # a coupled stop is followed in steps
+        assert abs(largest - LARGEST_SAMPLE) < (1e-9 if how == "fused" else 1e-5)
     walk = ROOT / "tests" / "unit" / "fmus" / "core" / "test_contact_laws.py"
     walked = python("-m", "pytest", "-v", "-p", "no:cacheprovider", str(walk))
     assert walked.returncode == 0, walked.stdout
