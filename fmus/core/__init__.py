@@ -1,5 +1,6 @@
 """The C core, called from Python: exact motion of an oscillator, modes of beams, near pairs of delay vectors."""
 
+from vibroimpact.fmus.core.contact_laws import ContactLaw, contact_law, contact_laws, numbered_contact_law
 from vibroimpact.fmus.core.correlation import (
     MOST_EMBEDDING,
     MOST_RADII,
@@ -18,12 +19,16 @@ __all__ = [
     "BeamModes",
     "Boundary",
     "Contact",
+    "ContactLaw",
     "Oscillator",
     "beam_modes",
+    "contact_law",
+    "contact_laws",
     "core_library",
     "flow",
     "motion",
     "near_pairs",
     "next_contact",
+    "numbered_contact_law",
     "radius_ladder",
 ]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from vibroimpact.fmus.core import contact_law
 from vibroimpact.fmus.shipped import fmu_path
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.orbits.control_plan import ControlPlan
-from vibroimpact.orchestrator.run.parameters import LAW_NUMBERS, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 
-EXTERNAL_LAW = 5
 SEEN = ("count", "last_time", "last_phase", "last_velocity")
 """Outputs of the contact that the controller is told."""
 
@@ -25,13 +25,13 @@ def coupled(plan: ControlPlan, controller: Path) -> tuple[list[ComponentSpec], l
     }
     contact = orbit.body.contacts[int(orbit.contacts[0])]
     numbers |= {
-        f"{port}.law": EXTERNAL_LAW,
+        f"{port}.law": contact_law("external").number,
         "forcing.angular_frequency": orbit.body.angular_frequency,
         "forcing.phase": float(orbit.phases[0]),
         "displacement_start": contact.position,
         "velocity_start": -contact.direction * contact.restitution * float(orbit.velocities[0]),
     }
-    stop = {"law": LAW_NUMBERS["restitution"], "restitution": contact.restitution}
+    stop = {"law": contact_law("restitution").number, "restitution": contact.restitution}
     errors = {"noise": settings.noise, "seed": settings.seed}
     components = [
         ComponentSpec("body", fmu_path("Oscillator"), numbers),

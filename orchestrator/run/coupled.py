@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus import fmu_path
+from vibroimpact.fmus.core import contact_law, numbered_contact_law
 from vibroimpact.fmus.packaging.archive import unpack, value_references
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
@@ -24,9 +25,6 @@ from vibroimpact.orchestrator.run.record import ImpactLimitReached, RecordedBody
 #: Impacts between two emptyings of the body's record: one impact writes at most two rows, of room for 512.
 IMPACTS_PER_BLOCK = 200
 BODY = "body"
-#: Contact laws by their numbers in the FMUs. A body leaves those of its stops to them: an impulse, or a force.
-RESTITUTION, EXTERNAL, EXTERNAL_FORCE = 1, 5, 6
-COMPLIANT = (2, 3, 4)
 #: What of a contact port is its stop's own too.
 LAW_PARAMETERS = ("position", "restitution", "yield_velocity", "stiffness", "damping", "exponent")
 ANSWERS = ("applied_restitution", "applied_force", "applied_stiffness", "applied_damping")
@@ -51,20 +49,22 @@ def connections_of(stops: int) -> list[ConnectionSpec]:
 
 def body_integers(integers: Mapping[str, int]) -> dict[str, int]:
     """Return a body's integer parameters for stops that are FMUs of their own: their laws become external."""
+    answers = {"rigid": contact_law("external").number, "yielding": contact_law("external_force").number}
 
-    def law_of(law: int) -> int:
-        if law in COMPLIANT:
-            return EXTERNAL_FORCE
-        return EXTERNAL if law == RESTITUTION else law
+    def law_of(number: int) -> int:
+        law = numbered_contact_law(number)
+        return number if law.external else answers.get(law.stop, number)
 
     return {name: law_of(v) if name.endswith("].law") else v for name, v in integers.items()}
 
 
 def stop_of(k: int, integers: Mapping[str, int], version: str = "3.0") -> ComponentSpec:
     """Return the component of stop `k` (1-based) with its law and side."""
-    law, side = integers.get(f"contact[{k}].law", RESTITUTION), integers.get(f"contact[{k}].side", 1)
-    known = law if law in (RESTITUTION, *COMPLIANT) else RESTITUTION
-    return ComponentSpec(stop_name(k), fmu_path("ImpactStop", version), {"law": known, "side": side})
+    rigid = contact_law("restitution").number
+    law, side = integers.get(f"contact[{k}].law", rigid), integers.get(f"contact[{k}].side", 1)
+    given = numbered_contact_law(law)
+    own = rigid if given.external or given.stop == "none" else law
+    return ComponentSpec(stop_name(k), fmu_path("ImpactStop", version), {"law": own, "side": side})
 
 
 def stop_parameters(stops: int, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 FMU_NAMES = {"oscillator": "Oscillator", "chain": "Chain", "beam": "Beam"}
-LAW_NUMBERS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
 SIDE_NUMBERS = {"upper": 1, "lower": 2}
 BOUNDARY_NUMBERS = {"clamped-free": 1, "clamped-clamped": 2, "clamped-pinned": 3, "pinned-pinned": 4}
 FORCING_NUMBERS = {"force": 1, "uniform": 2, "mode": 3, "base_acceleration": 4}
@@ -211,7 +211,7 @@ def contact_integers(scene: Scene) -> dict[str, int]:
     parameters: dict[str, int] = {}
     for k, stop in enumerate(scene.stops, start=1):
         port = f"contact[{k}]"
-        parameters[f"{port}.law"] = LAW_NUMBERS[stop.law]
+        parameters[f"{port}.law"] = contact_law(stop.law).number
         parameters[f"{port}.side"] = SIDE_NUMBERS[stop.side]
         if isinstance(scene.body, ChainBody):
             parameters[f"{port}.mass_number"] = stop_mass(scene.body, stop)

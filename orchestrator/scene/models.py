@@ -2,20 +2,20 @@
 
 A field says everything about itself in one place: its constraints, its default, and its `Rule`, from which messages,
 keys of sweeps, units of datasets, parameters of FMUs and the tables of docs/scene.md come (`fields`). Rules between
-fields or tables are in `rules`. Another contact law becomes one more model here and one more entry in `STOP_MODELS`;
-another kind of body likewise in `body_models`, the tables of a measuring chain are in `measuring_models`, those of a
+fields or tables are in `rules`. Another contact law becomes one more model here, in `Stop`; another kind of body one in
+`body_models`. The tables of a measuring chain are in `measuring_models`, those of a
 replay in `replay_models`, those of a sweep in `sweep_models`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.importer.specification import Exchange
-from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.fields import Rule, listed
 from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG, WORD_TAG
 
 MOST_SAMPLES_PER_RUN = 10**8
@@ -168,9 +168,6 @@ class Forcing(SceneTable):
         return 0.0 if given is None else given + 0.0  # of -0 too: 0
 
 
-_LAWS = Rule('"restitution", "kelvin_voigt", "hertz" or "hunt_crossley"')
-
-
 class StopTable(SceneTable):
     """Base of `[[stop]]`: where a stop is."""
 
@@ -198,7 +195,7 @@ class StopTable(SceneTable):
 class RestitutionStop(StopTable):
     """`[[stop]]`: a rigid stop; an impact multiplies the velocity by -restitution."""
 
-    law: Annotated[Literal["restitution"], _LAWS] = "restitution"
+    law: Annotated[Literal["restitution"], Rule()] = "restitution"
     restitution: Annotated[
         Fraction,
         Rule(
@@ -220,7 +217,7 @@ class RestitutionStop(StopTable):
 class KelvinVoigtStop(StopTable):
     """`[[stop]]`: a spring beside a dashpot; it never pulls."""
 
-    law: Annotated[Literal["kelvin_voigt"], _LAWS]
+    law: Annotated[Literal["kelvin_voigt"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m", fmu="contact[k].stiffness")]
     damping: Annotated[NotNegative, Rule(unit="N s/m", hint=FEEDS_ENERGY, fmu="contact[k].damping")] = 0.0
     relaxation_time: Annotated[
@@ -237,14 +234,14 @@ class KelvinVoigtStop(StopTable):
 class HertzStop(StopTable):
     """`[[stop]]`: an elastic ball, force = stiffness penetration^1.5."""
 
-    law: Annotated[Literal["hertz"], _LAWS]
+    law: Annotated[Literal["hertz"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m^1.5", fmu="contact[k].stiffness")]
 
 
 class HuntCrossleyStop(StopTable):
     """`[[stop]]`: force = stiffness penetration^exponent (1 + damping rate); it never pulls."""
 
-    law: Annotated[Literal["hunt_crossley"], _LAWS]
+    law: Annotated[Literal["hunt_crossley"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m^exponent", fmu="contact[k].stiffness")]
     damping: Annotated[NotNegative, Rule(unit="s/m", hint=FEEDS_ENERGY, fmu="contact[k].damping")] = 0.0
     exponent: Annotated[Finite, Field(ge=1, le=10), Rule(fmu="contact[k].exponent")] = 1.5
@@ -369,7 +366,7 @@ class Execution(SceneTable):
         Annotated[Finite, Field(gt=0, le=1e-2)] | None,
         Rule(
             "0 < tolerance <= 0.01",
-            hint="It is the relative error of the speed after one contact with a hertz or hunt_crossley stop.",
+            hint="It is the relative error of the speed after one contact whose force is a power of the penetration.",
             fmu="contact_tolerance",
             doc="relative error of the speed after one contact with a hertz or hunt_crossley stop, which is "
             "integrated; errors of contacts add up; the other laws are exact; not in general scenes",
@@ -392,8 +389,11 @@ class Execution(SceneTable):
 Stop = RestitutionStop | KelvinVoigtStop | HertzStop | HuntCrossleyStop
 
 STOP_MODELS: dict[str, type[Stop]] = {
-    "restitution": RestitutionStop,
-    "kelvin_voigt": KelvinVoigtStop,
-    "hertz": HertzStop,
-    "hunt_crossley": HuntCrossleyStop,
+    get_args(model.model_fields["law"].annotation)[0]: model for model in get_args(Stop)
 }
+"""Models of `[[stop]]` by contact law; the core has each law under the same name."""
+
+LAWS_THAT_YIELD = listed(
+    [f'"{law}"' for law, model in STOP_MODELS.items() if model is not RestitutionStop], "or"
+)
+"""In words."""

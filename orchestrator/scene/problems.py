@@ -19,7 +19,15 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.safe_toml import TooDeepError
-from vibroimpact.orchestrator.scene.fields import Rule, choices_of, field_of, forms_of, known_keys, rule_of
+from vibroimpact.orchestrator.scene.fields import (
+    Rule,
+    choices_of,
+    field_of,
+    forms_of,
+    known_keys,
+    listed,
+    rule_of,
+)
 
 Table = TypeVar("Table", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
@@ -282,11 +290,12 @@ def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) ->
 
 
 def choice_problem(
-    path: Sequence[str | int], field: FieldInfo, value: object, choices: Iterable[str]
+    path: Sequence[str | int], field: FieldInfo, value: object, choices: Collection[str]
 ) -> Problem:
     """Return the problem of a word that chooses a kind of table, and is none of these."""
     rule = rule_of(field)
-    return Problem(key_path(path), rule.expected, quoted(value), _value_hint(rule, value, choices))
+    expected = listed([quoted(choice) for choice in choices], "or")
+    return Problem(key_path(path), expected, quoted(value), _value_hint(rule, value, choices))
 
 
 def _value_hint(rule: Rule, value: object, words: Iterable[object]) -> str:

@@ -11,9 +11,8 @@ from vibroimpact.orchestrator.scene.models import (
     HuntCrossleyStop,
     KelvinVoigtStop,
     RestitutionStop,
+    StopTable,
 )
-
-Stop = RestitutionStop | KelvinVoigtStop | HertzStop | HuntCrossleyStop
 
 LEAST_RESTITUTION = 0.01
 """Coefficient of restitution below which no law that yields stands for another."""
@@ -29,12 +28,12 @@ POWER_LAW_TIME = 3.218065
 """Contact time of a Hertz stop over (mass^2 / (stiffness^2 speed))^(1/5)."""
 
 
-def restitution_at(stop: Stop, mass: float, speed: float) -> float:
+def restitution_at(stop: StopTable, mass: float, speed: float) -> float:
     """Return the coefficient of restitution that a stop gives a rigid mass; NaN for a law that none is known of.
 
     Parameters
     ----------
-    stop : RestitutionStop or KelvinVoigtStop or HertzStop or HuntCrossleyStop
+    stop : StopTable
     mass : float
         kg.
     speed : float
@@ -49,7 +48,9 @@ def restitution_at(stop: Stop, mass: float, speed: float) -> float:
             return restitution_of(stop.damping / (2.0 * math.sqrt(stop.stiffness * mass)))
         case HertzStop():
             return 1.0
-    return restitution_of_product(stop.damping * speed)
+        case HuntCrossleyStop():
+            return restitution_of_product(stop.damping * speed)
+    return math.nan
 
 
 def laws_of_equal_restitution(
@@ -86,16 +87,28 @@ def laws_of_equal_restitution(
     return laws
 
 
-def contact_time(stop: Stop, mass: float, speed: float) -> float:
-    """Return how long a rigid mass touches a stop, s; of a power law as if it had no damping; 0 of a rigid one."""
+def contact_time(stop: StopTable, mass: float, speed: float) -> float:
+    """Return how long a rigid mass touches a stop, s; of a power law as if it had no damping; 0 of a rigid one.
+
+    NaN for a law that none is known of.
+    """
     match stop:
         case RestitutionStop():
             return 0.0
         case KelvinVoigtStop():
             rate = math.sqrt(stop.stiffness / mass)
             return _angle(stop.damping / (2.0 * mass * rate)) / rate
-    n = 1.0 + (stop.exponent if isinstance(stop, HuntCrossleyStop) else 1.5)
-    depth: float = (n * mass * speed**2 / (2.0 * stop.stiffness)) ** (1.0 / n)
+        case HertzStop():
+            return _power_law_time(1.5, stop.stiffness, mass, speed)
+        case HuntCrossleyStop():
+            return _power_law_time(stop.exponent, stop.stiffness, mass, speed)
+    return math.nan
+
+
+def _power_law_time(exponent: float, stiffness: float, mass: float, speed: float) -> float:
+    """Return how long a rigid mass touches a stop whose force is a power of the penetration, s."""
+    n = 1.0 + exponent
+    depth: float = (n * mass * speed**2 / (2.0 * stiffness)) ** (1.0 / n)
     return 2.0 * depth / speed * math.sqrt(math.pi) * math.gamma(1.0 + 1.0 / n) / math.gamma(0.5 + 1.0 / n)
 
 

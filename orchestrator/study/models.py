@@ -9,10 +9,9 @@ from typing import Any
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
-from vibroimpact.orchestrator.scene.models import RestitutionStop
+from vibroimpact.orchestrator.scene.models import RestitutionStop, Stop
 from vibroimpact.orchestrator.study.equal_restitution import (
     LEAST_RESTITUTION,
-    Stop,
     contact_time,
     laws_of_equal_restitution,
     restitution_at,

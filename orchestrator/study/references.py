@@ -18,8 +18,6 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.models import (
-    HertzStop,
-    HuntCrossleyStop,
     KelvinVoigtStop,
     RestitutionStop,
 )
@@ -136,7 +134,7 @@ def reference_of(scene: Scene) -> Reference:
     if scene.general is not None:
         return _finest_exchange(scene)
     scales = scales_of(scene)
-    integrated = any(isinstance(stop, HertzStop | HuntCrossleyStop) for stop in scene.stops)
+    integrated = any(not isinstance(stop, RestitutionStop | KelvinVoigtStop) for stop in scene.stops)
     best = scene.with_values({"execution.how": "fused"})
     if integrated:
         best = best.with_values({"execution.contact_tolerance": FINEST})

@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
+from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, RestitutionStop
 from vibroimpact.orchestrator.study.models import other_models, other_modes
 from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.replays import ReplayTrial, rates_of
@@ -274,4 +274,4 @@ def _has_memory(scene: Scene) -> bool:
 
 
 def _integrates_contacts(scene: Scene) -> bool:
-    return any(isinstance(stop, HertzStop | HuntCrossleyStop) for stop in scene.stops)
+    return any(not isinstance(stop, RestitutionStop | KelvinVoigtStop) for stop in scene.stops)

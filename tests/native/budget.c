@@ -34,7 +34,7 @@ static vi_structure rattling(int modes, double gap)
         model.observed[j] = 1.0;
     }
     for (int k = 0; k < 2; ++k) {
-        contacts[k].law = (vi_contact_law){.law = VI_LAW_RESTITUTION, .restitution = 1.0};
+        contacts[k].law = vi_contact_law_rigid(1.0);
         contacts[k].side = k == 0 ? VI_SIDE_UPPER : VI_SIDE_LOWER;
         contacts[k].position = k == 0 ? gap : -gap;
     }

@@ -78,7 +78,7 @@ static void integrate(const vi_exchange_body *body, double from, double to, int 
 
 int main(void)
 {
-    const vi_contact_law rigid = {.law = VI_LAW_RESTITUTION, .restitution = 0.8};
+    const vi_contact_law rigid = vi_contact_law_rigid(0.8);
     vi_exchange_body body = begin(rigid, 0.5, -1.0, 0.0);
     CHECK(state.held_rate[0] == 0.0, "slopes of inputs are not looked at: %g", state.held_rate[0]);
     handle(&body);
@@ -88,7 +88,7 @@ int main(void)
     CHECK(fabs(contacts[0].last_velocity - 0.8660254) < 1e-3, "with %.9g", contacts[0].last_velocity);
 
     /* a plastic stop holds what is pressed, until the load turns */
-    const vi_contact_law plastic = {.law = VI_LAW_RESTITUTION, .restitution = 0.0};
+    const vi_contact_law plastic = vi_contact_law_rigid(0.0);
     body = begin(plastic, 0.0, -0.1, 1.0);
     handle(&body);
     integrate(&body, 0.0, 1.0, 10000);
@@ -101,9 +101,9 @@ int main(void)
 
     /* each law that yields gives back less than it took */
     const vi_contact_law yielding[] = {
-        {.law = VI_LAW_KELVIN_VOIGT, .stiffness = 1e3, .damping = 5.0},
-        {.law = VI_LAW_HERTZ, .stiffness = 1e4},
-        {.law = VI_LAW_HUNT_CROSSLEY, .stiffness = 1e4, .damping = 0.5, .exponent = 1.5},
+        {.law = vi_contact_law_number("kelvin_voigt"), .stiffness = 1e3, .damping = 5.0},
+        {.law = vi_contact_law_number("hertz"), .stiffness = 1e4},
+        {.law = vi_contact_law_number("hunt_crossley"), .stiffness = 1e4, .damping = 0.5, .exponent = 1.5},
     };
     for (int law = 0; law < 3; ++law) {
         body = begin(yielding[law], 0.0, -1.0, 0.0);
@@ -116,7 +116,7 @@ int main(void)
     }
 
     /* what an integrator cannot follow */
-    const vi_contact_law external = {.law = VI_LAW_EXTERNAL};
+    const vi_contact_law external = vi_contact_law_asking();
     body = begin(rigid, 0.5, -1.0, 0.0);
     contacts[0].law = external;
     char message[VI_MESSAGE_LENGTH] = "";

@@ -79,7 +79,7 @@ static void make(body *b, uint64_t *seed)
     const double position = choice(seed, 4) == 0 ? 0.0 : uniform(seed, -1.0, 1.0), gap = ANY(GAPS);
     for (int k = 0; k < STOPS; ++k) {
         vi_contact *contact = &b->saved.contacts[k];
-        contact->law.law = k == 0 || choice(seed, 2) == 0 ? VI_LAW_RESTITUTION : VI_LAW_NONE;
+        contact->law.law = k == 0 || choice(seed, 2) == 0 ? vi_contact_law_number("restitution") : vi_contact_law_number("none");
         contact->side = k == 0 ? VI_SIDE_UPPER : VI_SIDE_LOWER;
         contact->position = k == 0 ? position : position - gap;
         contact->law.restitution = ANY(RESTITUTIONS);
@@ -119,7 +119,7 @@ static void check_inside(body *b, int run)
     for (int k = 0; k < STOPS; ++k) {
         const vi_contact *contact = &b->saved.contacts[k];
         const double beyond = vi_contact_direction(contact->side) * (x - contact->position);
-        CHECK(contact->law.law == VI_LAW_NONE || beyond <= 0.0, "run %d: %g beyond stop %d", run, beyond, k + 1);
+        CHECK(contact->law.law == vi_contact_law_number("none") || beyond <= 0.0, "run %d: %g beyond stop %d", run, beyond, k + 1);
     }
 }
 
@@ -206,7 +206,7 @@ static void a_million_impacts_keep_their_phase(void)
     set_mode(b, 1.0, 0.2, 1.0, 0.5, 1.0);
     vi_clock_start(&b->saved.model.clock, 1.0, 0.0, 1.0);
     b->saved.contacts[0] = (vi_contact){
-        .law = {.law = VI_LAW_RESTITUTION, .restitution = .7}, .side = VI_SIDE_UPPER, .position = 1.0};
+        .law = vi_contact_law_rigid(.7), .side = VI_SIDE_UPPER, .position = 1.0};
     b->saved.contacts[1].side = VI_SIDE_UPPER;
     start(b, (vi_instant){0, 0.0, 0.0}, 0.0, 0.0);
     const vi_step_request request = {0.0, 1.0, false, false};

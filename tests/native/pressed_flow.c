@@ -47,7 +47,7 @@ static void set_stop(uint64_t *seed, int k, bool rigid)
     }
     const double stiffness = pow(10.0, uniform(seed, 1.0, 6.0));
     contact->side = VI_SIDE_UPPER;
-    contact->law.law = rigid ? VI_LAW_RESTITUTION : VI_LAW_KELVIN_VOIGT;
+    contact->law.law = rigid ? vi_contact_law_number("restitution") : vi_contact_law_number("kelvin_voigt");
     contact->law.stiffness = stiffness;
     contact->law.damping = choice(seed, 3) == 0 ? 0.0 : uniform(seed, 0.0, 3.0) * sqrt(stiffness / mobility);
 }

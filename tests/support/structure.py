@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from support.core_doors import library_with_doors
+from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.core.oscillator import SIDES
 from vibroimpact.fmus.errors import ComponentError, UsageError
 
 Array = NDArray[np.float64]
 
-LAWS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
 #: What a contact does, by the number in `Structure.statuses`.
 STATUSES = ("free", "touching", "held", "yielding", "receding")
 #: How `Structure.advance` may end.
@@ -67,7 +67,7 @@ class Stop:
 
     def _numbers(self) -> _Stop:
         return _Stop(
-            LAWS[self.law],
+            contact_law(self.law).number,
             SIDES[self.side],
             self.position,
             self.restitution,

@@ -125,7 +125,7 @@ static void check_places(const beam *b, char *message)
         check_location(message, name, b->sensor[k].location);
     }
     for (int k = 0; k < VI_PORTS; ++k) {
-        if (b->body.contacts[k].law.law != VI_LAW_NONE) {
+        if (!vi_contact_law_is_none(b->body.contacts[k].law.law)) {
             (void)snprintf(name, sizeof name, "contact[%d].location", k + 1);
             check_location(message, name, b->contact_location[k]);
         }
@@ -141,7 +141,7 @@ static void check_inputs(const beam *b, char *message)
 /* Is there a stop whose force acts on the beam? Pairs are not known before the importer says what they are. */
 static bool has_stop(const beam *b, int k)
 {
-    return b->body.contacts[k].law.law != VI_LAW_NONE;
+    return !vi_contact_law_is_none(b->body.contacts[k].law.law);
 }
 
 /* A residual vector has its full mass; a rigid stop would meet that of all modes beyond, which is none. */
@@ -149,7 +149,7 @@ static void check_residual(const beam *b, char *message)
 {
     for (int k = 0; b->residual && k < VI_PORTS; ++k) {
         const int64_t law = b->body.contacts[k].law.law;
-        if (law == VI_LAW_RESTITUTION || law == VI_LAW_EXTERNAL || law == VI_LAW_PAIR) {
+        if (!vi_contact_law_is_none(law) && !vi_contact_law_yields(law)) {
             vi_complain(message, "contact[%d].law: expected a stop that yields beside residual, got one that does not",
                         k + 1);
         }
@@ -325,7 +325,7 @@ static void place_contact(beam *b, int k, char *message)
     const double location = b->contact_location[k];
     find_shape(b, location, model->shape[k]);
     memcpy(model->impulse[k], model->shape[k], sizeof model->impulse[k]);
-    if (b->body.contacts[k].law.law == VI_LAW_NONE) {
+    if (vi_contact_law_is_none(b->body.contacts[k].law.law)) {
         return;
     }
     const double mobility = vi_structure_at(model, model->shape[k], model->shape[k]);

@@ -80,7 +80,7 @@ static bool parameters_are_good(const chain *c, char *message)
     check_masses(c, message);
     check_mass_number(message, "observed_mass", c, c->observed_mass);
     for (int k = 0; k < VI_PORTS; ++k) {
-        if (c->body.contacts[k].law.law != VI_LAW_NONE) {
+        if (!vi_contact_law_is_none(c->body.contacts[k].law.law)) {
             char name[32];
             (void)snprintf(name, sizeof name, "contact[%d].mass_number", k + 1);
             check_mass_number(message, name, c, c->contact_mass[k]);

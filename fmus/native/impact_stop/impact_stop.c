@@ -3,6 +3,7 @@
 #include <float.h>
 #include <math.h>
 
+#include "body/law_check.h"
 #include "plain.h"
 #include "impact_stop_variables.h"
 
@@ -12,8 +13,7 @@ static const double SURFACE_ROUNDING = 4.0 * DBL_EPSILON;
 static void defaults(void *self)
 {
     impact_stop *stop = self;
-    stop->law.law = VI_LAW_RESTITUTION;
-    stop->law.restitution = 1.0;
+    stop->law = vi_contact_law_rigid(1.0);
     stop->law.exponent = 1.5;
     stop->side = VI_SIDE_UPPER;
     stop->applied_restitution = 1.0;
@@ -32,7 +32,7 @@ static void update_outputs(void *self)
     impact_stop *stop = self;
     stop->applied = (vi_contact_force){0.0, 0.0, 0.0};
     stop->applied_restitution = 1.0;
-    if (vi_contact_law_is_compliant(stop->law.law)) {
+    if (vi_contact_law_yields(stop->law.law)) {
         const double rate = vi_contact_direction(stop->side) * stop->velocity;
         stop->applied = vi_contact_law_force(&stop->law, penetration_of(stop, rate), rate);
     } else {
@@ -40,33 +40,12 @@ static void update_outputs(void *self)
     }
 }
 
-static void check_restitution(char *message, const vi_contact_law *law)
-{
-    if (!(law->restitution >= 0.0 && law->restitution <= 1.0)) {
-        vi_complain(message, "restitution: expected 0 <= r <= 1, got %.17g", law->restitution);
-    }
-    vi_check_not_negative(message, "yield_velocity", law->yield_velocity);
-}
-
-static void check_compliance(char *message, const vi_contact_law *law)
-{
-    vi_check_positive(message, "stiffness", law->stiffness);
-    vi_check_not_negative(message, "damping", law->damping);
-    if (law->law == VI_LAW_HUNT_CROSSLEY && !(law->exponent >= 1.0 && isfinite(law->exponent))) {
-        vi_complain(message, "exponent: expected a finite number >= 1, got %.17g", law->exponent);
-    }
-}
-
 static bool parameters_are_good(const impact_stop *stop, char *message)
 {
-    if (!vi_contact_law_known(stop->law.law)) {
-        vi_complain(message,
-                    "law: expected 1 (restitution), 2 (kelvin_voigt), 3 (hertz) or 4 (hunt_crossley), got %lld",
-                    (long long)stop->law.law);
-    } else if (vi_contact_law_is_compliant(stop->law.law)) {
-        check_compliance(message, &stop->law);
+    if (!vi_contact_law_exists(stop->law.law) || !vi_contact_law_is_own(stop->law.law)) {
+        vi_complain_of_law(message, "law", "", vi_contact_law_is_own, stop->law.law);
     } else {
-        check_restitution(message, &stop->law);
+        vi_check_law_rules(message, "", &stop->law, vi_law_of(stop->law.law)->rules);
     }
     if (stop->side != VI_SIDE_UPPER && stop->side != VI_SIDE_LOWER) {
         vi_complain(message, "side: expected 1 (upper) or 2 (lower), got %lld", (long long)stop->side);

@@ -1,7 +1,8 @@
 """Reads `variables.toml`; every problem of the file is reported at once.
 
 `[component] include` names files whose units, enumerations and variables follow the component's own: what several
-components have in common is written once. There a dependency that a component does not have is left out.
+components have in common is written once. There a dependency that a component does not have is left out. An enumeration
+has its `items`, or names as `laws` the C file of the contact laws: `contact_laws`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.description.contact_laws import contact_laws
 from vibroimpact.fmus.packaging.description.model import (
     DEFAULT_INITIAL,
     ComponentDescription,
@@ -61,6 +63,7 @@ def read_component(path: Path) -> ComponentDescription:
     included = [_table(path.parent / name) for name in table.get("component", {}).get("include", ())]
     table = _merged(table, [part for part, _ in included])
     content += b"".join(more for _, more in included)
+    content += b"".join(repr(e["items"]).encode() for e in table.get("enumeration", ()) if "laws" in e)
     problems = list(_problems_of_table(table)) or list(_problems_of_variables(table))
     if problems:
         raise ComponentFileError("\n".join(f"{path}: {problem}" for problem in problems))
@@ -70,11 +73,15 @@ def read_component(path: Path) -> ComponentDescription:
 def _table(path: Path) -> tuple[dict[str, Any], bytes]:
     try:
         content = path.read_bytes()
-        return tomllib.loads(content.decode("utf-8")), content
+        table = tomllib.loads(content.decode("utf-8"))
     except OSError as error:
         raise ComponentFileError(f"{path}: expected a file, got: {error.strerror}.") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ComponentFileError(f"{path}: expected a TOML file, got one with: {error}.") from error
+    for entry in table.get("enumeration", ()):
+        if "laws" in entry:
+            entry["items"] = contact_laws(path.parent / entry["laws"], of_stop=entry.get("of_stop", False))
+    return table, content
 
 
 def _merged(table: Mapping[str, Any], included: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -121,7 +128,7 @@ def _component(table: Mapping[str, Any], path: Path, token: str) -> ComponentDes
 
 
 def _enumeration(entry: Mapping[str, Any]) -> Enumeration:
-    items = tuple(EnumerationItem(**item) for item in entry["items"])
+    items = tuple(entry["items"]) if "laws" in entry else tuple(EnumerationItem(**i) for i in entry["items"])
     return Enumeration(entry["name"], items, entry.get("description", ""))
 
 

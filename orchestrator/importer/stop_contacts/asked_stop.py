@@ -8,13 +8,12 @@ from contextlib import contextmanager
 from ctypes import c_void_p
 from itertools import pairwise
 
+from vibroimpact.fmus.core.contact_laws import rigid_law_numbers
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
 
 LOWER_SIDE = 2
-#: The number of ImpactStop's law that answers a coefficient of restitution, and no force.
-RESTITUTION = 1
 #: Search for the depth that stops a body: evaluations, and the misfit of the energy (logarithm) that ends it.
 PROBES = 40
 PROBE_MISFIT = 0.2
@@ -127,7 +126,7 @@ class AskedStop:
     @property
     def is_rigid(self) -> bool:
         """Does it answer with a coefficient of restitution, and no force?"""
-        return self._law is not None and int(self._law.get()[0]) == RESTITUTION
+        return self._law is not None and int(self._law.get()[0]) in rigid_law_numbers()
 
     def restitution(self, speed: float) -> float:
         """Return its coefficient of restitution for an impact at this speed, m/s; it is rigid."""

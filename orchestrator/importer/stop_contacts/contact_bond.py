@@ -18,13 +18,12 @@ from collections.abc import Sequence
 from ctypes import c_void_p
 from dataclasses import dataclass
 
+from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import DEEPER, LOWER_SIDE, depth_that_stops
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
-#: The law by which a body follows the force of another FMU; the number of `contact[k].law`.
-EXTERNAL_FORCE = 6
 #: What a body's contact port must have, beside the inputs.
 PORT_OUTPUTS = ("displacement", "velocity")
 FORCE, STIFFNESS, DAMPING = "applied_force", "applied_stiffness", "applied_damping"
@@ -124,7 +123,7 @@ class ContactBond:
     def begin(self) -> None:
         """Start a run: the parameters are set."""
         law, side = (int(v) for v in self._law.get())
-        self.follows = law == EXTERNAL_FORCE
+        self.follows = law == contact_law("external_force").number
         self.active = False
         for transfer in self._transfers:
             transfer.keep_at_start(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from vibroimpact.fmus.core.contact_laws import contact_law, rigid_law_numbers
 from vibroimpact.fmus.units import Unit, agree, parse_unit
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, VariableFacts
 from vibroimpact.orchestrator.scene.general.models import StopContactTable
@@ -12,8 +13,8 @@ from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
 from vibroimpact.orchestrator.scene.general.scene import component_variable, mass_place
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 
-#: Variables of a stop that say which law it follows, on which side it is; and the law without a force.
-LAW, SIDE, RESTITUTION = "law", "side", 1
+#: Variables of a stop that say which law it follows, on which side it is.
+LAW, SIDE = "law", "side"
 VELOCITY = "velocity"
 SIDES = {"upper": 1, "lower": 2}
 
@@ -146,7 +147,8 @@ def _is_rigid(draft: GeneralDraft, table: StopContactTable, facts: ComponentFact
     swept = draft.document.get("sweep")
     if isinstance(swept, dict) and f"{table.stop}.{LAW}" in swept:
         return False  # each point says it for itself
-    return (draft.components[table.stop].parameters or {}).get(LAW, RESTITUTION) == RESTITUTION
+    default = contact_law("restitution").number
+    return (draft.components[table.stop].parameters or {}).get(LAW, default) in rigid_law_numbers()
 
 
 def _bodies_say_their_mass(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.units import parse_unit
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
@@ -17,8 +18,8 @@ from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
 from vibroimpact.orchestrator.scene.general.scene import component_variable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 
-#: The law of a port that watches no stop of its own, and its number: lean descriptions have numbers alone.
-PAIR_LAW, PAIR_NUMBER = "pair", 7
+#: The law of a port that watches no stop of its own.
+PAIR_LAW = "pair"
 _PORT = re.compile(r"contact\[([1-9][0-9]?)\]")
 _MASS = re.compile(r"mass\[([1-9][0-9]?)\]")
 #: Variables that say where a port is: of a chain, of a beam. The last mass, the tip.
@@ -204,7 +205,8 @@ def _given_port_problem(component: DraftComponent, port: str, where: str, point:
     if law is None:
         return Problem(where, f"a contact port of {component.facts.file}", quoted(point))
     given = (component.parameters or {}).get(f"{port}.law", 0)
-    if given in (0, PAIR_NUMBER):
+    # lean descriptions have numbers alone
+    if given in (contact_law("none").number, contact_law(PAIR_LAW).number):
         return None
     names = {number: name for name, number in law.items.items()}
     hint = f'Remove {port}.law from its parameters: a pair sets it to "{PAIR_LAW}".'
@@ -246,7 +248,7 @@ def _no_port(facts: ComponentFacts, name: str, where: str) -> Problem:
 
 def _start_values(facts: ComponentFacts, port: str, rest: str) -> Mapping[str, StartValue]:
     """What a component must be given so that a port is at this point."""
-    values: dict[str, StartValue] = {f"{port}.law": PAIR_NUMBER}
+    values: dict[str, StartValue] = {f"{port}.law": contact_law(PAIR_LAW).number}
     if _PORT.fullmatch(rest):
         return values
     mass = _MASS.fullmatch(rest)

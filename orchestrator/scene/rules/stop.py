@@ -7,7 +7,7 @@ from itertools import combinations
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.draft import Draft
-from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, RestitutionStop, Stop
+from vibroimpact.orchestrator.scene.models import LAWS_THAT_YIELD, KelvinVoigtStop, RestitutionStop, Stop
 from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems
@@ -170,7 +170,7 @@ def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
     stops = [stop for stop in draft.stops if stop is not None]
     for number, stop in enumerate(draft.stops, start=1):
         if isinstance(stop, RestitutionStop):
-            hint = 'Use law = "kelvin_voigt", "hertz" or "hunt_crossley".'
+            hint = f"Use law = {LAWS_THAT_YIELD}."
             yield Problem(
                 f"stop[{number}].law", "a stop that yields beside residual = true", "a rigid one", hint
             )
@@ -193,8 +193,8 @@ def modes_that_are_found_converge(draft: Draft) -> Iterator[Problem]:
     for number, stop in enumerate(draft.stops, start=1):
         if isinstance(stop, RestitutionStop) and isinstance(draft.body, BeamBody):
             hint = (
-                'The mass that a rigid stop meets falls as 1 / modes: use law = "kelvin_voigt", "hertz" or '
-                '"hunt_crossley", or say how many modes.'
+                f"The mass that a rigid stop meets falls as 1 / modes: use law = {LAWS_THAT_YIELD}, or say how many "
+                "modes."
             )
             yield Problem(
                 f"stop[{number}].law", 'a stop that yields beside modes = "auto"', "a rigid one", hint

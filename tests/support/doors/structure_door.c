@@ -59,6 +59,11 @@ VI_DOOR vi_door_structure *vi_door_structure_new(int modes, const double natural
     if (modes < 1 || modes > VI_MODES || contacts < 0 || contacts > VI_PORTS) {
         return NULL;
     }
+    for (int k = 0; k < contacts; ++k) {
+        if (!vi_contact_law_exists((int64_t)stops[k].law)) {
+            return NULL;
+        }
+    }
     vi_door_structure *d = calloc(1, sizeof *d);
     if (d == NULL) {
         return NULL;

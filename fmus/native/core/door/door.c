@@ -73,7 +73,7 @@ VI_DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, con
                       double held_rate, double duration, double end[2])
 {
     body b;
-    const vi_contact none = {.law = {.law = VI_LAW_NONE}, .side = VI_SIDE_UPPER};
+    const vi_contact none = {.law = vi_contact_law_none(), .side = VI_SIDE_UPPER};
     if (!start(&b, oscillator, phase, state, &none) || !isfinite(held + held_rate)) {
         return 1;
     }
@@ -92,7 +92,7 @@ VI_DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double ph
 {
     body b;
     /* an external law: stop there, resolve nothing */
-    const vi_contact stop = {.law = {.law = VI_LAW_EXTERNAL}, .side = side, .position = position};
+    const vi_contact stop = {.law = vi_contact_law_asking(), .side = side, .position = position};
     if (!start(&b, oscillator, phase, state, &stop)) {
         return -1;
     }
@@ -119,7 +119,7 @@ VI_DOOR int vi_door_motion(const vi_door_oscillator *oscillator, double phase, c
                            double velocity[])
 {
     body b;
-    const vi_contact stop = {.law = {.law = side == 0 ? VI_LAW_NONE : VI_LAW_RESTITUTION, .restitution = restitution},
+    const vi_contact stop = {.law = side == 0 ? vi_contact_law_none() : vi_contact_law_rigid(restitution),
                              .side = side == 0 ? VI_SIDE_UPPER : side,
                              .position = position};
     if (!(restitution >= 0.0 && restitution <= 1.0) || !start(&b, oscillator, phase, state, &stop)) {

@@ -12,21 +12,9 @@
 #include <math.h>
 
 #include "body/modal/structure_state.h"
+#include "contact/press.h"
 #include "motion/polynomial.h"
 #include "motion/rows.h"
-
-typedef enum {
-    VI_PRESS_NONE = 0,
-    VI_PRESS_HOLD = 1,   /* the force that keeps the contact at rest */
-    VI_PRESS_LINEAR = 2, /* constant + stiffness d + damping d' */
-    VI_PRESS_POWER = 3   /* stiffness d^exponent (1 + damping d'), d > 0 */
-} vi_press_kind;
-
-/* How a contact presses; d = sign (displacement - position) is its penetration. */
-typedef struct {
-    vi_press_kind kind;
-    double constant, stiffness, damping, exponent;
-} vi_press;
 
 /* A row of modes. */
 enum { VI_ROW = VI_WHOLE_LANES(VI_MODES) };

@@ -166,12 +166,12 @@ static void add_losses(sums *sum)
 /* ---- a rest ---- */
 
 /* Energy that a spring has taken since displacements q, J. */
-static double spring_work(const vi_structure *s, int k, const double q[])
+static double spring_work(const vi_structure *s, int k, double stiffness, const double q[])
 {
     const double sign = vi_structure_direction(s, k), *shape = s->model->shape[k];
     const double before = sign * (vi_structure_at(s->model, shape, q) - s->contacts[k].position);
     const double after = sign * (vi_structure_at(s->model, shape, s->state->q) - s->contacts[k].position);
-    return 0.5 * s->contacts[k].law.stiffness * (after - before) * (after + before);
+    return 0.5 * stiffness * (after - before) * (after + before);
 }
 
 void vi_energies_of_rest(const vi_structure *s, const vi_pressed_flow *flow, const double q[], double u)
@@ -185,6 +185,7 @@ void vi_energies_of_rest(const vi_structure *s, const vi_pressed_flow *flow, con
     energies->forcing_work += forcing_work(&sum) + load_work(&sum, q);
     energies->damping_loss += sum.damping_loss;
     for (int i = 0; i < body->contacts; ++i) {
-        energies->contact_loss += body->held[i] ? 0.0 : spring_work(s, flow->pressed->port[i], q) + sum.at_stop[i];
+        const double work = spring_work(s, flow->pressed->port[i], body->stiffness[i], q);
+        energies->contact_loss += body->held[i] ? 0.0 : work + sum.at_stop[i];
     }
 }

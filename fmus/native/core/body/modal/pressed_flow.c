@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
 #include "modes/pressed_modes.h"
 #include "modes/pressed_response.h"
@@ -21,9 +22,11 @@ static bool is_linear(const vi_structure *s, int k)
     if (s->state->status[k] == VI_CONTACT_HELD) {
         return true;
     }
-    const vi_contact_law *law = &s->contacts[k].law;
-    return s->state->status[k] == VI_CONTACT_YIELDING && !s->state->leaving[k] && law->law == VI_LAW_KELVIN_VOIGT
-           && law->stiffness > 0.0 && !vi_structure_is_kept(s, k);
+    if (s->state->status[k] != VI_CONTACT_YIELDING || s->state->leaving[k]) {
+        return false;
+    }
+    const vi_contact_law *law = &s->contacts[k].law; /* the force of an external one is not followed so far */
+    return vi_law_of(law->law)->press == VI_PRESS_LINEAR && law->stiffness > 0.0 && !vi_structure_is_kept(s, k);
 }
 
 int vi_pressed_contacts(const vi_structure *s, int32_t port[VI_PORTS])
@@ -56,10 +59,10 @@ static void describe(const vi_structure *s, const int32_t port[], int contacts, 
     }
     for (int i = 0; i < contacts; ++i) {
         const int k = port[i];
-        const vi_contact_law *law = &s->contacts[k].law;
-        body->held[i] = s->state->status[k] == VI_CONTACT_HELD;
-        body->stiffness[i] = body->held[i] ? 0.0 : law->stiffness;
-        body->damping[i] = body->held[i] ? 0.0 : law->damping;
+        const vi_press press = vi_structure_press(s, k);
+        body->held[i] = press.kind == VI_PRESS_HOLD;
+        body->stiffness[i] = press.stiffness;
+        body->damping[i] = press.damping;
         for (int j = 0; j < vi_structure_modes(model); ++j) {
             body->shape[i][j] = vi_structure_direction(s, k) * model->shape[k][j];
         }

@@ -275,7 +275,7 @@ static void place(const vi_structure *s, int k)
 {
     vi_structure_state *state = s->state;
     const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k), clearance = vi_structure_clearance(s, k);
-    if (!vi_contact_law_has_stop(s->contacts[k].law.law) || clearance > noise) {
+    if (s->model->stop[k] == VI_NO_STOP || clearance > noise) {
         return;
     }
     state->status[k] = VI_CONTACT_TOUCHING;
@@ -301,8 +301,8 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     *state = fresh;
     s->model->asks = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
-        const int64_t law = s->contacts[k].law.law;
-        s->model->asks |= law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE;
+        s->model->stop[k] = (int32_t)vi_law_of(s->contacts[k].law.law)->stop;
+        s->model->asks |= vi_contact_law_asks(s->contacts[k].law.law);
         vi_contact_clear(&s->contacts[k]);
         s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;
         place(s, k);

@@ -3,16 +3,11 @@
 #include "body/modal/structure_contact.h"
 #include "body/modal/structure_impact.h"
 
-static bool is_external(const vi_structure *s, int k)
-{
-    return s->contacts[k].law.law == VI_LAW_EXTERNAL || s->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE;
-}
-
 bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here)
 {
     bool any = false;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (!hit[k] || !is_external(s, k)) {
+    for (int k = 0; s->model->asks && k < s->model->contacts; ++k) {
+        if (!hit[k] || !vi_contact_law_asks(s->contacts[k].law.law)) {
             continue;
         }
         s->contacts[k].event_time = vi_clock_time(&s->model->clock, s->state->now);
@@ -30,8 +25,7 @@ void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
 {
     int rigid[VI_PORTS] = {0}, any = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
-        const int64_t law = s->contacts[k].law.law;
-        if (hit[k] && (vi_contact_law_is_compliant(law) || law == VI_LAW_EXTERNAL_FORCE)) {
+        if (hit[k] && s->model->stop[k] == VI_YIELDING_STOP) {
             vi_structure_touch_down(s, k);
         } else if (hit[k]) {
             rigid[k] = any = 1;

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "body/law_check.h"
 #include "body/modal/structure_impact.h"
 
 /* An importer's communication point may differ from the body's own time by this times (1 + |time|), s. */
@@ -57,45 +58,22 @@ static port_name name_of(int k, const char *variable)
     return name;
 }
 
-static void check_yielding(char *message, int k, const vi_contact *contact)
-{
-    const vi_contact_law *law = &contact->law;
-    vi_check_positive(message, name_of(k, "stiffness").text, law->stiffness);
-    if (law->law != VI_LAW_HERTZ) {
-        vi_check_not_negative(message, name_of(k, "damping").text, law->damping);
-    }
-    if (law->law == VI_LAW_HUNT_CROSSLEY && !(law->exponent >= 1.0 && isfinite(law->exponent))) {
-        vi_complain(message, "contact[%d].exponent: expected a finite number >= 1, got %.17g", k + 1, law->exponent);
-    }
-}
-
-static bool law_exists(int64_t law)
-{
-    return vi_contact_law_known(law) || law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE
-           || law == VI_LAW_PAIR;
-}
-
 static void check_contact(char *message, int k, const vi_contact *contact)
 {
     const vi_contact_law *law = &contact->law;
-    if (!law_exists(law->law)) {
-        vi_complain(message,
-                    "contact[%d].law: expected 0 (none), 1 (restitution), 2 (kelvin_voigt), 3 (hertz),"
-                    " 4 (hunt_crossley), 5 (external), 6 (external_force) or 7 (pair), got %lld",
-                    k + 1, (long long)law->law);
+    const port_name port = name_of(k, "");
+    if (!vi_contact_law_exists(law->law)) {
+        vi_complain_of_law(message, name_of(k, "law").text, "", vi_contact_law_exists, law->law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
         vi_complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", k + 1,
                     (long long)contact->side);
     }
     vi_check_finite(message, name_of(k, "position").text, contact->position);
-    if (!(law->restitution >= 0.0 && law->restitution <= 1.0)) {
-        vi_complain(message, "contact[%d].restitution: expected 0 <= r <= 1, got %.17g", k + 1, law->restitution);
-    }
-    vi_check_not_negative(message, name_of(k, "yield_velocity").text, law->yield_velocity);
+    vi_check_law_rules(message, port.text, law, vi_impact_rules);
     vi_check_not_negative(message, name_of(k, "relaxation_time").text, contact->relaxation_time);
-    if (vi_contact_law_is_compliant(law->law)) {
-        check_yielding(message, k, contact);
+    if (vi_contact_law_yields(law->law)) {
+        vi_check_law_rules(message, port.text, law, vi_law_of(law->law)->rules);
     }
 }
 
@@ -124,7 +102,7 @@ void vi_structure_component_check(const vi_structure_component *c, char message[
     vi_check_not_negative(message, "forcing.angular_frequency", c->forcing_angular_frequency);
     vi_check_finite(message, "forcing.phase", c->forcing_phase);
     for (int k = 0; k < VI_PORTS; ++k) {
-        if (c->contacts[k].law.law != VI_LAW_NONE) {
+        if (!vi_contact_law_is_none(c->contacts[k].law.law)) {
             check_contact(message, k, &c->contacts[k]);
         }
     }
@@ -141,7 +119,7 @@ void vi_structure_component_check(const vi_structure_component *c, char message[
 int vi_structure_component_ports(const vi_structure_component *c)
 {
     int ports = VI_PORTS;
-    while (ports > 0 && c->contacts[ports - 1].law.law == VI_LAW_NONE) {
+    while (ports > 0 && vi_contact_law_is_none(c->contacts[ports - 1].law.law)) {
         --ports;
     }
     return ports;
@@ -155,8 +133,8 @@ static bool at_one_point(const vi_structure_model *model, int i, int j)
 /* Does the body meet stop i first, for good? A rigid one is never passed. */
 static bool hides(const vi_contact *i, const vi_contact *j)
 {
-    const bool rigid = i->law.law == VI_LAW_RESTITUTION || i->law.law == VI_LAW_EXTERNAL;
-    return rigid && vi_contact_direction(i->side) * (j->position - i->position) >= 0.0;
+    return vi_contact_law_is_rigid(i->law.law)
+           && vi_contact_direction(i->side) * (j->position - i->position) >= 0.0;
 }
 
 static void check_pair(const vi_contact contacts[], int i, int j, char *message)
@@ -384,7 +362,7 @@ static void check_answer(const vi_structure_component *c, int k, char *message)
 {
     const vi_contact *contact = &c->contacts[k];
     const double r = contact->applied_restitution;
-    if (contact->law.law == VI_LAW_EXTERNAL && !(contact->answered && r >= 0.0 && r <= 1.0)) {
+    if (vi_contact_law_is_rigid(contact->law.law) && !(contact->answered && r >= 0.0 && r <= 1.0)) {
         vi_complain(message, "contact[%d].applied_restitution: expected an answer 0 <= r <= 1 to the contact at"
                              " %.17g s, got %s%.17g", k + 1, contact->event_time,
                     contact->answered ? "" : "none; last value ", r);
@@ -425,7 +403,7 @@ vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_inst
 bool vi_structure_component_needs_events(const vi_structure_component *c)
 {
     for (int k = 0; k < VI_PORTS; ++k) {
-        if (c->contacts[k].law.law == VI_LAW_EXTERNAL || c->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE) {
+        if (vi_contact_law_asks(c->contacts[k].law.law)) {
             return true;
         }
     }

@@ -5,6 +5,7 @@
 
 #include "body/contact_events.h"
 #include "body/landing.h"
+#include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
 #include "motion/majorant.h"
 
@@ -99,10 +100,8 @@ void vi_structure_touch_down(const vi_structure *s, int k)
 /* What has the sign of a compliant contact's force, whether it is pressed or not. */
 static double pressing_now(const vi_structure *s, int k)
 {
-    const vi_contact_law *law = &s->contacts[k].law;
-    const double depth = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
-    const double damping = law->law == VI_LAW_HERTZ ? 0.0 : law->damping;
-    return damping * rate + (law->law == VI_LAW_KELVIN_VOIGT ? law->stiffness * depth : 1.0);
+    const vi_press press = vi_structure_stop_press(s, k);
+    return vi_press_sense(&press, -vi_structure_clearance(s, k), vi_structure_approach(s, k));
 }
 
 /* A contact that ends at the instant at which it began without speed has only touched: it stays as it is until something moves. */
@@ -151,8 +150,7 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
     state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
     state->separated[k] = state->now;
-    const int64_t law = s->contacts[k].law.law;
-    const bool linear = law == VI_LAW_KELVIN_VOIGT || law == VI_LAW_EXTERNAL_FORCE;
+    const bool linear = vi_structure_stop_press(s, k).kind == VI_PRESS_LINEAR;
     /* the force is gone before the penetration, or with it */
     if (receding && (linear ? penetration > WITH_IT * noise : pressing_now(s, k) <= GONE && penetration > noise)) {
         state->status[k] = VI_CONTACT_RECEDING;

@@ -6,6 +6,7 @@
 
 #include "body/landing.h"
 #include "body/modal/structure_contact.h"
+#include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
 #include "body/modal/structure_thin.h"
 #include "motion/majorant.h"
@@ -177,12 +178,9 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
 /* Rounding of what has the sign of a compliant contact's force: the force itself or, of a power law, 1 + damping d'. */
 static double pressing_noise(const vi_structure *s, int k)
 {
-    const vi_contact_law *law = &s->contacts[k].law;
-    const bool linear = law->law == VI_LAW_KELVIN_VOIGT || law->law == VI_LAW_EXTERNAL_FORCE;
-    const double damping = law->law == VI_LAW_EXTERNAL_FORCE ? s->contacts[k].applied_damping : law->damping;
-    const double stiffness = law->law == VI_LAW_EXTERNAL_FORCE ? s->contacts[k].applied_stiffness : law->stiffness;
-    const double level = linear ? stiffness * vi_structure_displacement_size(s, k) : 1.0;
-    return VI_ROUNDING * (level + (law->law == VI_LAW_HERTZ ? 0.0 : damping * vi_structure_velocity_size(s, k)));
+    const vi_press press = vi_structure_stop_press(s, k);
+    const double level = press.kind == VI_PRESS_POWER ? 1.0 : press.stiffness * vi_structure_displacement_size(s, k);
+    return VI_ROUNDING * (level + (press.damping != 0.0 ? press.damping * vi_structure_velocity_size(s, k) : 0.0));
 }
 
 /* What has the sign of a yielding contact's force, and falls through zero with it: the force itself or, of a power law,
@@ -265,6 +263,7 @@ static void separations(const vi_structure *s, const vi_drift *drift, const vi_s
 static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, double gap[VI_ORDER + 1])
 {
     const vi_contact *contact = &s->contacts[k];
+    const vi_press press = vi_structure_stop_press(s, k);
     const double *depth = drift->penetration[k], tau = contact->relaxation_time;
     const double elapsed = vi_clock_elapsed(&s->model->clock, s->state->separated[k], s->state->now);
     const bool lags = vi_structure_surface_lags(s, k);
@@ -274,10 +273,10 @@ static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, d
         if (lags) {
             gap[n] = surface - depth[n];
             surface *= -1.0 / (tau * (double)(n + 1));
-        } else if (contact->law.law == VI_LAW_KELVIN_VOIGT) {
-            gap[n] = -(contact->law.stiffness * depth[n] + contact->law.damping * rate);
+        } else if (press.kind == VI_PRESS_LINEAR) {
+            gap[n] = -(press.stiffness * depth[n] + press.damping * rate);
         } else {
-            gap[n] = -((n == 0 ? 1.0 : 0.0) + (contact->law.law == VI_LAW_HERTZ ? 0.0 : contact->law.damping) * rate);
+            gap[n] = -((n == 0 ? 1.0 : 0.0) + press.damping * rate);
         }
     }
     gap[VI_ORDER] = lags ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is not known */
@@ -287,7 +286,7 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
 {
     const double *depth = drift->penetration[k], tau = s->contacts[k].relaxation_time;
     const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(depth, length));
-    if (s->contacts[k].law.law != VI_LAW_EXTERNAL_FORCE) {
+    if (!vi_contact_law_is_external(s->contacts[k].law.law)) {
         double gap[VI_ORDER + 1];
         gap_to_return(s, drift, k, gap);
         const double small = VI_ROUNDING * vi_polynomial_size(gap, length);

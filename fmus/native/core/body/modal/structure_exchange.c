@@ -2,9 +2,11 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/law_check.h"
 #include "body/modal/structure_arrival.h"
 #include "body/modal/structure_contact.h"
 #include "body/modal/structure_forces.h"
@@ -26,12 +28,19 @@ void vi_exchange_enable(const vi_exchange_body *body)
 
 /* ---- start ---- */
 
+static bool is_inside(int64_t law)
+{
+    return !vi_contact_law_is_external(law);
+}
+
 static void check_contact(const vi_contact *contact, int k, char *message)
 {
-    if (contact->law.law >= VI_LAW_EXTERNAL) {
-        vi_complain(message, "contact[%d].law: expected a law that the body evaluates itself, 0 (none) to 4"
-                             " (hunt_crossley), in model exchange, got %lld", k + 1, (long long)contact->law.law);
-    } else if (vi_contact_law_is_compliant(contact->law.law) && contact->relaxation_time > 0.0) {
+    if (!is_inside(contact->law.law)) {
+        char name[48];
+        (void)snprintf(name, sizeof name, "contact[%d].law", k + 1);
+        vi_complain_of_law(message, name, "a law that the body evaluates itself in model exchange, ", is_inside,
+                           contact->law.law);
+    } else if (vi_contact_law_yields(contact->law.law) && contact->relaxation_time > 0.0) {
         vi_complain(message, "contact[%d].relaxation_time: expected 0 in model exchange, got %.17g", k + 1,
                     contact->relaxation_time);
     }
@@ -73,7 +82,7 @@ static void find_nominals(const vi_structure *s)
     }
     for (int k = 0; k < model->contacts; ++k) {
         const double mobility = model->compliance[k][k];
-        if (s->contacts[k].law.law != VI_LAW_NONE && mobility > 0.0) {
+        if (!vi_contact_law_is_none(s->contacts[k].law.law) && mobility > 0.0) {
             displacement = vi_max(displacement, fabs(s->contacts[k].position) / sqrt(mobility));
         }
     }
@@ -173,13 +182,9 @@ void vi_exchange_get_derivatives(const vi_exchange_body *body, double derivative
  * what is left of 1 + damping d', times the depth that is typical of this motion. */
 static double pressing_depth(const vi_structure *s, int k)
 {
-    const vi_contact_law *law = &s->contacts[k].law;
-    const double depth = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
-    if (law->law == VI_LAW_KELVIN_VOIGT) {
-        return depth + law->damping / law->stiffness * rate;
-    }
+    const vi_press press = vi_structure_stop_press(s, k);
     const double typical = s->state->exchange.displacement * sqrt(s->model->compliance[k][k]);
-    return law->law == VI_LAW_HERTZ ? typical : typical * (1.0 + law->damping * rate);
+    return vi_press_sense_depth(&press, -vi_structure_clearance(s, k), vi_structure_approach(s, k), typical);
 }
 
 /* Resolution of a displacement of contact k: of its terms, and of what a velocity makes of them within a radian. */
@@ -199,8 +204,8 @@ static double indicator(const vi_structure *s, int k, const double force[])
     switch (s->state->status[k]) {
     case VI_CONTACT_HELD: return force[k] * force_scale / (rate * rate) + room;
     case VI_CONTACT_YIELDING:
-        return (s->contacts[k].law.law == VI_LAW_KELVIN_VOIGT ? pressing_depth(s, k)
-                                                              : vi_min(-clearance, pressing_depth(s, k))) + room;
+        return (vi_structure_press(s, k).kind == VI_PRESS_LINEAR ? pressing_depth(s, k)
+                                                                 : vi_min(-clearance, pressing_depth(s, k))) + room;
     case VI_CONTACT_RECEDING: return vi_min(-clearance, -pressing_depth(s, k)) + room;
     case VI_CONTACT_TOUCHING: return vi_structure_only_touches(s, k) ? HUGE_VAL : room;
     default: return clearance + room;
@@ -235,7 +240,7 @@ void vi_exchange_show_indicators(const vi_exchange_body *body)
 static int arrive(const vi_structure *s, int k)
 {
     const double approach = vi_structure_approach(s, k), noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
-    const bool rigid = s->contacts[k].law.law == VI_LAW_RESTITUTION;
+    const bool rigid = s->model->stop[k] == VI_RIGID_STOP;
     if (rigid) {
         vi_structure_put_on_stop(s, k);
     }

@@ -3,40 +3,47 @@
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
-vi_press vi_structure_press(const vi_structure *s, int k)
+/* The force that another FMU gave when its stop was last asked, followed along its slopes. */
+static vi_press followed_force(const vi_structure *s, int k)
 {
     const vi_contact *contact = &s->contacts[k];
-    const vi_structure_state *state = s->state;
-    if (state->status[k] == VI_CONTACT_HELD) {
-        return (vi_press){.kind = VI_PRESS_HOLD};
-    }
-    if (state->status[k] != VI_CONTACT_YIELDING) {
-        return (vi_press){.kind = VI_PRESS_NONE};
-    }
-    switch (contact->law.law) {
-    case VI_LAW_KELVIN_VOIGT:
-        return (vi_press){VI_PRESS_LINEAR, 0.0, contact->law.stiffness, contact->law.damping, 1.0};
-    case VI_LAW_HERTZ: return (vi_press){VI_PRESS_POWER, 0.0, contact->law.stiffness, 0.0, 1.5};
-    case VI_LAW_HUNT_CROSSLEY:
-        return (vi_press){VI_PRESS_POWER, 0.0, contact->law.stiffness, contact->law.damping, contact->law.exponent};
-    default: break;
-    }
-    const double constant = contact->applied_force - contact->applied_stiffness * state->reference_penetration[k]
-                            - contact->applied_damping * state->reference_rate[k];
+    const double constant = contact->applied_force - contact->applied_stiffness * s->state->reference_penetration[k]
+                            - contact->applied_damping * s->state->reference_rate[k];
     return (vi_press){VI_PRESS_LINEAR, constant, contact->applied_stiffness, contact->applied_damping, 1.0};
+}
+
+static inline vi_press stop_press(const vi_structure *s, int k, const vi_law *law)
+{
+    return law->external ? followed_force(s, k) : vi_law_press(law, &s->contacts[k].law);
+}
+
+vi_press vi_structure_stop_press(const vi_structure *s, int k)
+{
+    return stop_press(s, k, vi_law_of(s->contacts[k].law.law));
+}
+
+vi_press vi_structure_press(const vi_structure *s, int k)
+{
+    switch (s->state->status[k]) {
+    case VI_CONTACT_HELD: return (vi_press){.kind = VI_PRESS_HOLD};
+    case VI_CONTACT_YIELDING: return stop_press(s, k, vi_law_of(s->contacts[k].law.law));
+    default: return (vi_press){.kind = VI_PRESS_NONE};
+    }
 }
 
 vi_contact_force vi_structure_yield(const vi_structure *s, int k)
 {
-    const vi_press press = vi_structure_press(s, k);
+    const vi_law *law = vi_law_of(s->contacts[k].law.law);
     const double d = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
-    if (press.kind == VI_PRESS_LINEAR) {
-        const double force = press.constant + press.stiffness * d + press.damping * rate;
-        /* an integrator looks beyond the end of a contact before it finds it: there the force goes on smoothly */
-        const double least = s->state->exchange.on ? force : 0.0;
-        return (vi_contact_force){vi_max(least, force), press.stiffness, press.damping};
+    if (law->press == VI_PRESS_POWER) {
+        const vi_press press = vi_law_press(law, &s->contacts[k].law);
+        return vi_law_force(law, &press, d, rate);
     }
-    return vi_contact_law_force(&s->contacts[k].law, d, rate);
+    const vi_press press = stop_press(s, k, law);
+    const double force = press.constant + press.stiffness * d + press.damping * rate;
+    /* an integrator looks beyond the end of a contact before it finds it: there the force goes on smoothly */
+    const double least = s->state->exchange.on ? force : 0.0;
+    return (vi_contact_force){vi_max(least, force), press.stiffness, press.damping};
 }
 
 void vi_structure_push(const vi_structure *s, int k, double force, double acceleration[])

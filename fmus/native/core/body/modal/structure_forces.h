@@ -5,6 +5,9 @@
 #include "body/modal/coupled_flow.h"
 #include "body/modal/structure_state.h"
 
+/* How the stop of contact k presses a body that yields to it, whether it does so now or not. */
+vi_press vi_structure_stop_press(const vi_structure *s, int k);
+
 /* How contact k presses now. */
 vi_press vi_structure_press(const vi_structure *s, int k);
 

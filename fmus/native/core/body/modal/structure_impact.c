@@ -23,8 +23,8 @@ static const double HIGHEST_UNRESOLVED = 1e-4;
 static double restitution_of(const vi_structure *s, int k, double approach)
 {
     const vi_contact *contact = &s->contacts[k];
-    return contact->law.law == VI_LAW_EXTERNAL ? contact->applied_restitution
-                                               : vi_contact_law_restitution(&contact->law, approach);
+    const bool asked = s->model->asks && vi_contact_law_is_external(contact->law.law);
+    return asked ? contact->applied_restitution : vi_contact_law_restitution(&contact->law, approach);
 }
 
 static double drag_at(const vi_structure *s, int k)
@@ -330,7 +330,7 @@ void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
         collide_once(s, now);
         int any = 0;
         for (int k = 0; k < s->model->contacts; ++k) {
-            const bool rigid = s->contacts[k].law.law == VI_LAW_RESTITUTION;
+            const bool rigid = s->model->stop[k] == VI_RIGID_STOP && !vi_contact_law_is_external(s->contacts[k].law.law);
             if (rigid && vi_structure_meets_now(s, k)) { /* thrown against it by the last round, in a corner */
                 s->state->status[k] = VI_CONTACT_TOUCHING;
                 s->state->leaving[k] = 0;

@@ -39,9 +39,9 @@ static double fastest_rate(const vi_structure *s, const int32_t port[], int cont
     double stiffness = 0.0, damping = 0.0;
     for (int i = 0; i < contacts; ++i) {
         const int k = port[i];
-        const double mobility = s->state->status[k] == VI_CONTACT_HELD ? 0.0 : s->model->compliance[k][k];
-        stiffness += s->contacts[k].law.stiffness * mobility;
-        damping += s->contacts[k].law.damping * mobility;
+        const vi_press press = vi_structure_press(s, k);
+        stiffness += press.stiffness * s->model->compliance[k][k];
+        damping += press.damping * s->model->compliance[k][k];
     }
     return s->model->fastest + sqrt(stiffness) + damping;
 }
@@ -251,8 +251,11 @@ double vi_structure_rest_on(const vi_structure *s, double length, double room)
         return 0.0;
     }
     const int contacts = vi_pressed_contacts(s, port);
+    if (contacts == 0 || s->state->series < patience(s)) {
+        return 0.0;
+    }
     const double fastest = fastest_rate(s, port, contacts);
-    if (contacts == 0 || s->state->series < patience(s) || !(length * fastest >= pays(s))) {
+    if (!(length * fastest >= pays(s))) {
         return 0.0;
     }
     const vi_pressed *pressed = vi_pressed_find(s, pays_for_all(s, length * fastest));

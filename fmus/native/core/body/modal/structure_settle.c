@@ -14,8 +14,7 @@ static const double LITTLE = 16.0;
 
 static bool gives_way(const vi_structure *s, int k)
 {
-    const int64_t law = s->contacts[k].law.law;
-    return vi_contact_law_is_compliant(law) || law == VI_LAW_EXTERNAL_FORCE;
+    return s->model->stop[k] == VI_YIELDING_STOP;
 }
 
 /* Contacts that touch without speed, the rigid ones first: a compliant stop presses only once it is pressed in. */

@@ -128,8 +128,7 @@ double vi_structure_clearance(const vi_structure *s, int k)
 /* Is the stop one that impacts alone are answered with, and is the contact met there? */
 static bool is_rigid(const vi_structure *s, int k)
 {
-    const int64_t law = s->contacts[k].law.law;
-    return vi_structure_watched(s, k) && (law == VI_LAW_RESTITUTION || law == VI_LAW_EXTERNAL);
+    return vi_structure_watched(s, k) && s->model->stop[k] == VI_RIGID_STOP;
 }
 
 double vi_structure_within(const vi_structure *s, double displacement)
@@ -204,10 +203,8 @@ double vi_structure_kinetic(const vi_structure *s)
 int vi_structure_beyond(const vi_structure *s)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
-        const int64_t law = s->contacts[k].law.law;
-        const bool rigid = !vi_contact_law_is_compliant(law) && law != VI_LAW_EXTERNAL_FORCE;
         const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
-        if (vi_contact_law_has_stop(law) && rigid && vi_structure_clearance(s, k) < -noise) {
+        if (vi_contact_law_is_rigid(s->contacts[k].law.law) && vi_structure_clearance(s, k) < -noise) {
             return k + 1;
         }
     }
@@ -237,7 +234,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
     state->budget.unfinished = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const vi_contact *contact = &s->contacts[k];
-        if (contact->law.law == VI_LAW_EXTERNAL_FORCE) {
+        if (s->model->stop[k] == VI_YIELDING_STOP && vi_contact_law_is_external(contact->law.law)) {
             state->reference_penetration[k] = -vi_structure_clearance(s, k);
             state->reference_rate[k] = vi_structure_approach(s, k);
             if (state->status[k] == VI_CONTACT_RECEDING && contact->applied_force > 0.0) {

@@ -28,7 +28,7 @@ typedef struct {
     int32_t modes;         /* in use, 1 to VI_MODES */
     int32_t contacts;      /* ports in use, 0 to VI_PORTS */
     int64_t impact_limit;  /* most events of contacts since the start; 0: no limit */
-    double tolerance;      /* relative error of a nonlinear contact (hertz, hunt_crossley) */
+    double tolerance;      /* relative error of a contact whose force is a power of the penetration */
     vi_clock clock;
     vi_mode mode[VI_MODES]; /* by vi_structure_mode, in ascending order of natural frequency */
     double shape[VI_PORTS][VI_MODES];
@@ -41,6 +41,7 @@ typedef struct {
     int64_t asks;              /* derived by vi_structure_start: does another component answer for a contact? 64 bits: no padding */
     /* derived by vi_structure_prepare */
     int32_t at_observed[VI_PORTS];         /* is the contact at the observed point? */
+    int32_t stop[VI_PORTS];                /* vi_stop_kind of the contact's law; derived by vi_structure_start */
     double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
     double mobility_low[VI_PORTS][VI_PORTS]; /* its rounding: else it adds up over elastic impacts, always one way */
     double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
@@ -235,7 +236,7 @@ double vi_structure_most_acceleration(const vi_structure *s, int k);
 /* Is this contact looked for? */
 static inline bool vi_structure_watched(const vi_structure *s, int k)
 {
-    return vi_contact_law_has_stop(s->contacts[k].law.law) && !s->state->passed;
+    return s->model->stop[k] != VI_NO_STOP && !s->state->passed;
 }
 
 /* Kinetic energy of the modes, J. */

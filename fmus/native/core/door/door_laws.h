@@ -1,0 +1,12 @@
+/* The table of contact laws for Python. */
+#ifndef VIBROIMPACT_DOOR_LAWS_H
+#define VIBROIMPACT_DOOR_LAWS_H
+
+/* Numbers of laws are below this. */
+int vi_door_most_laws(void);
+
+/* Name of the law of a number, its kind of stop (vi_stop_kind), and whether another FMU answers or hits; NULL: there is no
+ * law of this number. */
+const char *vi_door_law(int number, int *stop, int *external);
+
+#endif
