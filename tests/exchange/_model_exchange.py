@@ -8,7 +8,7 @@ from pathlib import Path
 from exchange._single import Request, Rows, columns, run_program
 
 TOLERANCES = (1e-6, 1e-9, 1e-11)
-#: Bodies that are integrated, and their steps: 500 of the beam have 91 impacts in them.
+#: Bodies that are integrated, and their steps.
 STEPS = {
     "oscillator": 2000,
     "chain of 3": 2000,
