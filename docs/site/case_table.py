@@ -15,7 +15,7 @@ def with_case_table(page: str) -> str:
     """Return the page with the table of all cases."""
     rows = ["| case | what is hard | claim | against | figure | bound |", "|---|---|---|---|---|---|"]
     for case in CASES:
-        bound = f"{case.bound:.0e}" if case.bound else "0"
+        bound = f"{case.bound:.2g}"
         words = [f"`{case.name}`", case.title, case.claim, case.reference, case.of, bound]
         rows.append(f"| {' | '.join(words)} |")
     table = "\n".join(rows)

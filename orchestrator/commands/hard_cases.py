@@ -19,6 +19,9 @@ from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, dataset_of, measured_cases
 
+VERDICTS = ("wrong", "slow")
+"""Of cases beyond their bound: a figure that is an error, and one that is a time."""
+
 
 def show_hard_cases(
     only: Sequence[str], output: Path | None, figure: Path | None, force: bool, names: bool
@@ -28,7 +31,7 @@ def show_hard_cases(
     Raises
     ------
     typer.Exit
-        A bound was missed, or Ctrl-C came; what was measured before is printed and written.
+        A figure is wrong, or Ctrl-C came; what was measured before is printed and written.
     """
     if names:
         for case in CASES:
@@ -54,12 +57,19 @@ def show_hard_cases(
         _write(measured, output, figure)
     missed = [one.case.name for one in measured if not one.is_met]
     met = f"{len(measured) - len(missed)} of {counted(len(measured), 'bound')} met"
-    say(f"{met}{f'; missed: {chr(44).join(missed)}' if missed else ''}.")
+    worded = (
+        f"{word.capitalize()}: {', '.join(found)}" for word in VERDICTS if (found := _of(measured, word))
+    )
+    say(". ".join([met, *worded]) + ".")
     if interrupted:
         say(f"Interrupted: {len(measured)} of {len(cases_named(only))} cases were measured.", err=True)
         raise typer.Exit(130)
-    if missed:
+    if _of(measured, "wrong"):
         raise typer.Exit(1)
+
+
+def _of(measured: Sequence[Measured], verdict: str) -> list[str]:
+    return [one.case.name for one in measured if one.verdict == verdict]
 
 
 def _write(measured: Sequence[Measured], output: Path | None, figure: Path | None) -> None:
@@ -105,9 +115,9 @@ def _table(measured: Sequence[Measured]) -> Table:
             one.case.name,
             one.case.title,
             _told(one),
-            f"{one.case.bound:.0e}" if one.case.bound else "0",
+            f"{one.case.bound:.2g}",
             one.case.of,
             duration(one.seconds),
-            "" if one.is_met else "MISSED",
+            "" if one.is_met else one.verdict.upper(),
         )
     return rows

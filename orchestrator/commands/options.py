@@ -146,7 +146,7 @@ def hard_cases(
     """Run what breaks solvers of impacts, and print each figure beside its bound.
 
     Grazes, resonance, chatter into rest, stops that are next to rigid, units from nano to giga: each against a closed
-    form or a law of conservation. Exit code 1: a bound is missed on this machine.
+    form or a law of conservation. Exit code 1: a figure is wrong on this machine; what is slow alone is told.
 
     Example: vibroimpact hard-cases --only grazing-from-above --only chatter --figure hard_cases.png
     """

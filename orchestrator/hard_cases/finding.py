@@ -175,7 +175,7 @@ CASES = (
         "each is an impact, with the speed of the closed form",
         "energy of the free motion, closed form",
         "relative error of the speed, down to a peak of 1e-8",
-        1e-6,
+        6e-7,
         _from_above,
     ),
     HardCase(
@@ -195,7 +195,7 @@ CASES = (
         "the first ripple that touches is found",
         "sum of the modes in closed form, root of its first crossing",
         "relative error of the time",
-        1e-11,
+        7e-15,
         _ripple,
     ),
     HardCase(
@@ -205,7 +205,7 @@ CASES = (
         "the instant at which the growing motion meets the stop",
         "closed form with the beat as a sinc",
         "relative error of the time",
-        1e-12,
+        4e-15,
         _resonance,
     ),
     HardCase(
@@ -215,7 +215,7 @@ CASES = (
         "the instant at which the motion from -1 comes to -0.3",
         "closed form",
         "relative error of the time",
-        1e-12,
+        7e-15,
         _dampings,
     ),
 )

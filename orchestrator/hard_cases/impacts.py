@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, largest, relative
 from vibroimpact.orchestrator.hard_cases.runs import (
+    IMPACT_IMPULSE,
     IMPACT_TIME,
     IMPACT_VELOCITY,
     PLAIN,
     STICK_START,
+    impacts_of_points,
     restitution,
     run,
 )
@@ -107,6 +110,129 @@ def _simultaneous() -> Found:
     return Found(largest(off), Curve(time, off, "time (-)", "asymmetry, error of the energy (-)"))
 
 
+MASSES = (1.0, 2.5, 0.4)
+COEFFICIENTS = (0.3, 0.7, 0.95)
+
+
+def _absolute_restitution() -> Found:
+    """What each impact gives a mass of a chain, or the tip of a clamped beam, whose shapes are 2 there."""
+    errors = []
+    for place, r in enumerate(COEFFICIENTS):
+        chain = {"kind": "chain", "masses": list(MASSES), "stiffnesses": 1.0, "dampings": 0.05}
+        beam = {"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0, "modes": 4}
+        for body, force, stop, mobility in (
+            (
+                chain,
+                {"amplitude": [1.0, 0.0, 0.0], "angular_frequency": 0.7},
+                {"mass": place + 1},
+                1.0 / MASSES[place],
+            ),
+            (beam, {"amplitude": 1.0, "angular_frequency": 3.0, "location": 0.7}, {"location": 1.0}, 16.0),
+        ):
+            record = run(
+                body=body | ({} if body is chain else {"damping_ratio": 0.02}),
+                forcing=force,
+                stop=[restitution(0.05, r, **stop)],
+                record={"recorded_periods": 10},
+            )
+            assert record.impacts is not None
+            given = record.impacts[:, IMPACT_IMPULSE] * mobility / record.impacts[:, IMPACT_VELOCITY]
+            errors.append(largest(relative(given, 1.0 + r)))
+    off = np.array(errors)
+    places = np.arange(1.0, 1.0 + len(off))
+    return Found(
+        largest(off), Curve(places, off, "chain, beam at each restitution", "relative error of 1 + r (-)")
+    )
+
+
+FALLS = np.array([0.25, 1.0, 3.0, 1024.0])
+
+
+def _at_a_border() -> Found:
+    """A free mass that meets its stop where one recording ends and the next begins, to the last bit or one beside."""
+    wrong = []
+    for fall in FALLS:
+        body = {"mass": 1.0, "stiffness": 0.0, "displacement_start": -float(fall), "velocity_start": 1.0}
+        for border in (fall, np.nextafter(fall, 0.0), np.nextafter(fall, math.inf)):
+            counted = 0
+            for record in (
+                {"recorded_time": float(border)},
+                {"transient_time": float(border), "recorded_time": float(fall)},
+            ):
+                impacts = run(body=body, stop=[restitution(0.0, 0.5)], record=record).impacts
+                assert impacts is not None
+                counted += len(impacts)
+            wrong.append(abs(counted - 1.0))
+    off = np.array(wrong).reshape(-1, 3).sum(axis=1)
+    return Found(
+        float(off.sum()),
+        Curve(FALLS, off, "length of the recording (-)", "miscounts (-)", x_log=True, y_log=False),
+    )
+
+
+SMALLEST = np.array([1e-300, 1e-100, 1e-20])
+
+
+def _dead_stop() -> Found:
+    """A restitution next to 0: the motion is that with a dead stop."""
+
+    def end_of(r: float) -> tuple[float, float]:
+        record = run(
+            body=PLAIN | {"damping_ratio": 0.05},
+            forcing={"amplitude": 1.0, "angular_frequency": 0.9},
+            stop=[restitution(0.3, r)],
+            record={"recorded_periods": 20},
+        )
+        return record.final_displacement, record.final_velocity
+
+    dead = np.array(end_of(0.0))
+    off = np.array([np.abs(np.array(end_of(float(r))) - dead).max() for r in SMALLEST])
+    return Found(largest(off), Curve(SMALLEST, off, "restitution (-)", "change of the end (-)", x_log=True))
+
+
+def _in_lanes() -> Found:
+    """Sweeps of the starts of one mass, a chain and a beam, in lanes of the vector registers and one by one."""
+    starts = {"start": -0.9, "stop": 0.1, "points": 20}
+    bodies: tuple[tuple[dict[str, Any], dict[str, Any], str], ...] = (
+        (
+            PLAIN | {"damping_ratio": 0.1},
+            {"amplitude": 0.5, "angular_frequency": 1.0},
+            "body.displacement_start",
+        ),
+        (
+            {
+                **{"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": 1.0, "dampings": 0.1},
+                "displacement_start": [0.0, 0.0],
+            },
+            {"amplitude": [0.5, 0.0], "angular_frequency": 0.9},
+            "body.displacement_start[2]",
+        ),
+        (
+            {
+                **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0},
+                **{"modes": 4, "damping_ratio": 0.05, "displacement_start": [0.0, 0.0, 0.0, 0.0]},
+            },
+            {"amplitude": 5.0, "angular_frequency": 3.0, "location": 1.0},
+            "body.displacement_start[1]",
+        ),
+    )
+    errors = []
+    for body, forcing, key in bodies:
+        tables = {
+            **{"body": body, "forcing": forcing, "stop": [restitution(0.3, 0.7)]},
+            **{"record": {"recorded_periods": 12}, "sweep": {key: starts}},
+        }
+        pairs = zip(impacts_of_points("auto", **tables), impacts_of_points("fused", **tables), strict=True)
+        errors += [
+            largest(relative(lanes, alone)) if lanes.shape == alone.shape else math.inf
+            for lanes, alone in pairs
+        ]
+    off = np.array(errors)
+    return Found(
+        largest(off), Curve(np.arange(1.0, 61.0), off, "points of mass, chain, beam", "relative error (-)")
+    )
+
+
 CASES = (
     HardCase(
         "elastic-million",
@@ -115,7 +241,7 @@ CASES = (
         "the energy stays",
         "conservation",
         "relative error of the energy",
-        1e-10,
+        3e-14,
         _elastic,
     ),
     HardCase(
@@ -125,7 +251,7 @@ CASES = (
         "impacts and the instant of rest",
         "geometric sums in closed form",
         "relative error of times and speeds",
-        1e-10,
+        3e-11,
         _nearly_elastic,
     ),
     HardCase(
@@ -135,7 +261,7 @@ CASES = (
         "each found, the speed kept",
         "free flight",
         "relative error of times and speeds",
-        1e-12,
+        9e-16,
         _narrow_gap,
     ),
     HardCase(
@@ -145,7 +271,47 @@ CASES = (
         "the energy stays, and so does the symmetry",
         "conservation, mirror symmetry",
         "asymmetry, or relative error of the energy",
-        1e-11,
+        1.2e-12,
         _simultaneous,
+    ),
+    HardCase(
+        "absolute-restitution",
+        THEME,
+        "masses of a chain and the tip of a beam, restitution 0.3, 0.7 and 0.95",
+        "each impact turns its speed round by the restitution itself",
+        "mass, or shapes of the tip, in closed form",
+        "relative error of 1 + r",
+        2e-14,
+        _absolute_restitution,
+    ),
+    HardCase(
+        "at-a-border",
+        THEME,
+        "an impact at the instant where one recording ends and the next begins",
+        "belongs to one of them",
+        "free flight",
+        "miscounts",
+        0.0,
+        _at_a_border,
+    ),
+    HardCase(
+        "next-to-dead",
+        THEME,
+        "restitution 1e-300 to 1e-20",
+        "the motion is that with restitution 0",
+        "the dead stop",
+        "change of the end",
+        9e-16,
+        _dead_stop,
+    ),
+    HardCase(
+        "in-lanes",
+        THEME,
+        "60 points of a mass, a chain and a beam, many at once",
+        "have the impacts that they have one by one",
+        "each point run alone",
+        "relative error of times and speeds",
+        7e-14,
+        _in_lanes,
     ),
 )

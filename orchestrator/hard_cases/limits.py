@@ -44,14 +44,15 @@ def _deadlines() -> Found:
     ]
     late = []
     for scene in scenes:
-        began = time.perf_counter()
+        began = time.process_time()
         record = recorded(**scene, record=LONG_RUN, execution={"deadline": DEADLINE, "impact_limit": 10**12})
-        spent = time.perf_counter() - began
+        spent = time.process_time() - began
         late.append(spent - DEADLINE if record.outcome == Outcome.timeout else math.inf)
     off = np.array(late)
     words = "1 stiff dashpot, 2 no room, 3 stiff springs"
     return Found(
-        largest(off), Curve(np.arange(1.0, 4.0), off, words, "time after the deadline (s)", y_log=False)
+        largest(off),
+        Curve(np.arange(1.0, 4.0), off, words, "processor time after the deadline (s)", y_log=False),
     )
 
 
@@ -134,9 +135,10 @@ CASES = (
         "a dashpot of 1e5, stops 1e-300 off, springs of 1e12 N/m with 1e-5 m of room, 10^7 periods in one step",
         "the deadline is kept within the step",
         "-",
-        "time after the deadline in s",
+        "processor time after the deadline in s",
         2.0,
         _deadlines,
+        is_time=True,
     ),
     HardCase(
         "beyond-numbers",
@@ -155,7 +157,7 @@ CASES = (
         "the same end",
         "each other",
         "change of the end",
-        1e-12,
+        4e-14,
         _impact_limits,
     ),
     HardCase(
@@ -165,7 +167,7 @@ CASES = (
         "keeps its energy",
         "conservation",
         "relative error of the energy",
-        1e-12,
+        9e-16,
         _long_free_motion,
     ),
 )

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene
 
-IMPACT_TIME, IMPACT_VELOCITY, IMPACT_RESTITUTION, IMPACT_DURATION = 0, 2, 5, 6
+IMPACT_TIME, IMPACT_VELOCITY, IMPACT_IMPULSE, IMPACT_RESTITUTION, IMPACT_DURATION = 0, 2, 3, 5, 6
 """Columns of the impacts of a record."""
 STICK_START, STICK_END = 0, 1
 """Columns of its sticks."""
@@ -41,6 +46,19 @@ def run(**tables: Any) -> RunRecord:
             f"hard case: expected a run to its end, got {record.outcome.name}: {record.message}"
         )
     return record
+
+
+def impacts_of_points(how: str, **tables: Any) -> list[NDArray[np.float64]]:
+    """Return times and speeds of the impacts of each point of a sweep, shape (impact, 2), run in this way."""
+    from vibroimpact.analysis.dataset import read_flat
+    from vibroimpact.orchestrator.campaign import run_scene
+
+    document = {"scene": {"units": "nondimensional"}, "execution": {"how": how}, **tables}
+    with TemporaryDirectory() as folder:
+        run_scene(Scene.from_dict(document, "hard case"), Path(folder, "points.nc"))
+        rows = read_flat(Path(folder, "points.nc")).load()
+    found = np.stack([rows.impact_time.values, rows.impact_velocity.values], axis=1)
+    return np.split(found, np.cumsum(rows.impact_count.values)[:-1])
 
 
 def restitution(position: float, coefficient: float, **keys: Any) -> dict[str, Any]:

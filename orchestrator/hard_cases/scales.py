@@ -157,7 +157,7 @@ CASES = (
         "the same motion on rigid and yielding stops",
         "the motion at 1",
         "relative change of the state at the end",
-        1e-11,
+        1.6e-13,
         _units,
     ),
     HardCase(
@@ -167,7 +167,7 @@ CASES = (
         "ends in the steady motion",
         "closed form",
         "relative error of the end after 10^6 periods",
-        1e-9,
+        5e-15,
         _one_step,
     ),
     HardCase(
@@ -187,7 +187,7 @@ CASES = (
         "outside of the stops, the energy kept",
         "conservation",
         "relative distance beyond the stops, or error of the energy",
-        1e-9,
+        2e-12,
         _many_modes,
     ),
 )

@@ -162,7 +162,7 @@ CASES = (
         "energy is balanced",
         "balance",
         "relative error of the balance",
-        1e-9,
+        1.7e-13,
         _all_laws,
     ),
     HardCase(
@@ -172,7 +172,7 @@ CASES = (
         "energy is balanced",
         "balance",
         "relative error of the balance",
-        1e-9,
+        2.6e-13,
         _uneven_beam,
     ),
     HardCase(
@@ -182,7 +182,7 @@ CASES = (
         "comes to an end, energy balanced",
         "balance",
         "relative error of the balance",
-        1e-9,
+        6e-13,
         _rest_beside,
     ),
     HardCase(
@@ -192,7 +192,7 @@ CASES = (
         "gives its energy back",
         "balance",
         "relative error of the balance",
-        1e-11,
+        1.3e-13,
         _overdamped,
     ),
     HardCase(
@@ -202,7 +202,7 @@ CASES = (
         "both are met, and both let go",
         "conservation of energy",
         "relative error of the speeds",
-        1e-12,
+        4e-15,
         _behind,
     ),
     HardCase(
@@ -212,7 +212,7 @@ CASES = (
         "is pressed in to its static place",
         "statics",
         "relative error of the place",
-        1e-6,
+        6e-12,
         _pressed_between,
     ),
 )

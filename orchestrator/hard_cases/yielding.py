@@ -11,6 +11,7 @@ from vibroimpact.orchestrator.hard_cases.runs import (
     IMPACT_DURATION,
     IMPACT_RESTITUTION,
     IMPACT_TIME,
+    IMPACT_VELOCITY,
     PLAIN,
     kelvin_voigt,
     restitution,
@@ -130,6 +131,29 @@ def _touches() -> Found:
     )
 
 
+OPEN_STIFFNESSES = 10.0 ** np.arange(2.0, 13.0, 2.0)
+
+
+def _open_contact() -> Found:
+    """A contact that is open when the recording ends: it has its touch-down and speed, and no number of its end."""
+    errors = []
+    for stiffness in OPEN_STIFFNESSES:
+        record = run(
+            body=PLAIN | {"displacement_start": -1.0},
+            stop=[kelvin_voigt(0.0, float(stiffness))],
+            record={"recorded_time": 0.5 * math.pi * (1.0 + 0.5 / math.sqrt(1.0 + stiffness))},
+        )
+        assert record.impacts is not None
+        if len(record.impacts) != 1 or not math.isnan(record.impacts[0, IMPACT_DURATION]):
+            errors.append(math.inf)
+            continue
+        time = relative(record.impacts[:, IMPACT_TIME], 0.5 * math.pi)
+        errors.append(max(largest(time), largest(relative(record.impacts[:, IMPACT_VELOCITY], 1.0))))
+    off = np.array(errors)
+    curve = Curve(OPEN_STIFFNESSES, off, "stiffness (-)", "relative error of time and speed (-)", x_log=True)
+    return Found(largest(off), curve)
+
+
 CASES = (
     HardCase(
         "nearly-rigid",
@@ -138,7 +162,7 @@ CASES = (
         "tends to the rigid stop in proportion to the contact time",
         "the rigid stop",
         "distance of the order of convergence from 1",
-        0.1,
+        1.1e-3,
         _nearly_rigid,
     ),
     HardCase(
@@ -148,7 +172,7 @@ CASES = (
         "the restitution of the law",
         "p (1 + e) = ln((1 + p) / (1 - p e))",
         "relative error of the restitution",
-        1e-9,
+        9e-11,
         _hunt_crossley,
     ),
     HardCase(
@@ -158,7 +182,7 @@ CASES = (
         "stays there",
         "statics",
         "relative motion in 100 s",
-        1e-13,
+        9e-16,
         _preloaded,
     ),
     HardCase(
@@ -168,7 +192,17 @@ CASES = (
         "each found once, each takes its time",
         "free flight and half a period of the spring",
         "relative error of times and durations",
-        1e-7,
+        5e-10,
         _touches,
+    ),
+    HardCase(
+        "open-contact",
+        THEME,
+        "a contact that is open when the recording ends, stiffness 1e2 to 1e12",
+        "is an impact of it, whose end is not known",
+        "free motion in closed form",
+        "relative error of time and speed",
+        9e-16,
+        _open_contact,
     ),
 )

@@ -37,7 +37,7 @@ def test_a_missed_bound_ends_with_1(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vibroimpact.orchestrator.hard_cases.measuring.CASES", (case,))
     done = in_this_process("hard-cases")
     assert done.returncode == 1
-    assert "0 of 1 bound met; missed: never." in done.stdout
+    assert "0 of 1 bound met. Wrong: never." in done.stdout
 
 
 def test_a_name_that_is_none_ends_with_2_and_leaves_nothing(tmp_path: Path) -> None:

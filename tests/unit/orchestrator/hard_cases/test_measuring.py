@@ -102,3 +102,14 @@ def test_a_figure_that_is_no_number_misses_its_bound() -> None:
 def test_the_first_root_is_the_first() -> None:
     assert first_root(lambda t: np.sin(t) - 0.5, 10.0) == pytest.approx(math.pi / 6.0, rel=1e-15)
     assert relative(1.5, 1.0) == 0.5
+
+
+def test_a_time_beyond_its_bound_is_slow_and_an_error_is_wrong() -> None:
+    nothing = Curve(np.empty(0), np.empty(0), "", "")
+    late, error = (replace(CASES[0], bound=1.0, is_time=is_time) for is_time in (True, False))
+    assert Measured(late, Found(2.0, nothing), 0.0).verdict == "slow"
+    assert Measured(error, Found(2.0, nothing), 0.0).verdict == "wrong"
+    assert Measured(late, Found(math.inf, nothing), 0.0).verdict == "wrong"
+    assert Measured(late, Found(0.5, nothing), 0.0).verdict == "met"
+    found = dataset_of([Measured(late, Found(2.0, nothing), 0.0)])
+    assert (found.verdict.item(), bool(found.is_met)) == ("slow", False)
