@@ -198,7 +198,7 @@ def _cells(tool: Tool, table: str, row: Row) -> Iterator[tuple[str, list[Cell]]]
 def _row_of_tool(tool: Tool, fmi: str, names: list[str]) -> Iterator[Cell]:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
-            it = made(name, fmi, Path(folder))
+            it = made(name, fmi, Path(folder)).read_by(tool, fmi)
             yield _cell(run, it.rows, tool, it.path, it.outputs, it.step, len(it.rows), Path(folder))
 
 

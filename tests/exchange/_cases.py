@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from xarray import Dataset
 
+from exchange._single import described
+from exchange._tools import Tool
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
@@ -76,6 +78,14 @@ class Exchanged:
     rows: Rows
     smooth: tuple[str, ...] = ()
     quiet: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+
+    def read_by(self, tool: Tool, fmi: str) -> Exchanged:
+        """Return what a tool is compared with: all outputs that it can read."""
+        if fmi not in tool.without_integers:
+            return self
+        kinds = described(str(self.path))
+        kept = tuple(name for name in self.outputs if kinds[name][1] != "integer")
+        return replace(self, outputs=kept, rows=self.rows[:, [self.outputs.index(name) for name in kept]])
 
     def integrated(self, count: int) -> Exchanged:
         """Return what an integrator is compared with: the smooth outputs of the first steps."""

@@ -43,6 +43,8 @@ class Tool:
         The versions of FMI that it speaks.
     couples : tuple of str
         The versions of FMI of which it couples FMUs.
+    without_integers : tuple of str
+        The versions of FMI whose integers it cannot read: Ecos has half of the room for those of FMI 3.0, and ends.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Tool:
     package: str = ""
     program: str = ""
     couples: tuple[str, ...] = ()
+    without_integers: tuple[str, ...] = ()
 
     def missing(self) -> str:
         """Return why it cannot be tried here, empty where it can."""
@@ -105,7 +108,7 @@ TOOLS = (
     Tool("FMPy", ("2.0", "3.0"), package="fmpy", couples=("2.0",)),
     # libcosim 0.11 speaks FMI 3.0 not at all, and ends with a segmentation fault when it is given such an FMU
     Tool("libcosim", ("2.0",), package="libcosimpy", couples=("2.0",)),
-    Tool("Ecos", ("2.0", "3.0"), package="ecospy", couples=("2.0", "3.0")),
+    Tool("Ecos", ("2.0", "3.0"), package="ecospy", couples=("2.0", "3.0"), without_integers=("3.0",)),
     Tool("PyFMI", ("2.0",), package="pyfmi", couples=("2.0",)),
     Tool("fmusim", ("2.0", "3.0"), program="fmusim"),
     Tool("OMSimulator", ("2.0", "3.0"), program="OMSimulator", couples=("2.0", "3.0")),

@@ -25,7 +25,7 @@ from exchange._cases import (
     made_pair,
     our_run,
 )
-from exchange._model_exchange import ALLOWED, STEPS, TOLERANCES
+from exchange._model_exchange import ALLOWED, STEPS, TOLERANCES, USUAL
 from exchange._tools import TOOLS, Tool, run, run_coupled, run_integrated
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
@@ -50,7 +50,7 @@ def skip_where_missing(tool: Tool) -> None:
 )
 def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fmi: str, name: str) -> None:
     skip_where_missing(tool)
-    it = made(name, fmi, tmp_path)
+    it = made(name, fmi, tmp_path).read_by(tool, fmi)
     answer = run(tool, it.path, it.outputs, it.step, len(it.rows), tmp_path)
     rows = np.array(answer.rows)
     assert rows.shape == it.rows.shape
@@ -80,7 +80,10 @@ def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Pat
     asked = (tool, it.path, it.outputs, it.step, len(it.rows), tmp_path)
     found = [np.array(run_integrated(*asked, tolerance).rows) for tolerance in TOLERANCES]
     errors = [difference(rows[it.quiet], it.rows[it.quiet]) for rows in found]
-    assert all(error <= ALLOWED * tolerance for error, tolerance in zip(errors, TOLERANCES, strict=True))
+    judged = [
+        (error, tolerance) for error, tolerance in zip(errors, TOLERANCES, strict=True) if tolerance < USUAL
+    ]
+    assert all(error <= ALLOWED * tolerance for error, tolerance in judged)
     assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
 
 
