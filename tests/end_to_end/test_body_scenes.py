@@ -169,7 +169,8 @@ def test_coupled_runs_are_fused_runs(kind: str, law: str) -> None:
     fused = PointRunner(scene, execution="fused").run({})
     coupled = PointRunner(scene, execution="coupled").run({})
     assert fused.impacts is not None
-    assert coupled.impacts == pytest.approx(fused.impacts, rel=1e-9, abs=1e-12)
+    # a contact that is open at the end has no impulse and no duration
+    assert coupled.impacts == pytest.approx(fused.impacts, rel=1e-9, abs=1e-12, nan_ok=True)
     assert coupled.final_state == pytest.approx(fused.final_state, rel=1e-9, abs=1e-12)
 
 
@@ -182,10 +183,14 @@ def test_a_contact_with_a_stop_that_yields_is_one_impact_with_its_impulse_and_du
     text = with_series(text_of(kind, YIELDING, 40, 1), rate, names)
     run_scene(parse_scene(text, "s.toml"), tmp_path / "run.nc")
     with open_dataset(tmp_path / "run.nc") as ds:
-        impulse = np.trapezoid(ds.contact_force.values, ds.time.values)
-        assert ds.impact_impulse.values.sum() == pytest.approx(impulse, rel=1e-3)
-        assert (ds.impact_duration.values > 0.0).all()
-        assert (ds.impact_restitution.values < 1.0).all()
+        is_over = np.isfinite(ds.impact_duration.values)
+        assert is_over[:-1].all()
+        # the last contact may be open at the end
+        before = ds.time.values < np.append(ds.impact_time.values[~is_over], np.inf)[0]
+        impulse = np.trapezoid(ds.contact_force.values[before], ds.time.values[before])
+        assert ds.impact_impulse.values[is_over].sum() == pytest.approx(impulse, rel=1e-3)
+        assert (ds.impact_duration.values[is_over] > 0.0).all()
+        assert (ds.impact_restitution.values[is_over] < 1.0).all()
         assert ds.contact_force.values.min() >= 0.0
 
 
