@@ -42,6 +42,7 @@ test: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run all tests but benchmarks and 
 soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run long series, then thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
 	$(BIN)/python -m pytest --ignore=tests/benchmarks -m long $(PARALLEL)
 	PYTHONPATH=tests $(BIN)/python -m soak
+	PYTHONPATH=tests $(BIN)/python -m mutants
 
 sanitize: $(VENV)/test.stamp ## run the C tests under the address and undefined-behaviour sanitizers
 	$(BIN)/python tests/native/run_sanitized.py

@@ -1,0 +1,125 @@
+"""Faults that would be the worst to miss: too small to be seen, or in one kind of body or lanes alone."""
+
+from __future__ import annotations
+
+from soak._kinds import SEED_STRIDE
+
+from mutants._faults import NATIVE, Fault
+from mutants._trial import tried
+
+CHOSEN = {
+    "restitution below 1 is off by 1e-9": (
+        "core/contact/contact_law.c",
+        "    return law->restitution;",
+        "    return law->restitution * (law->restitution < 1.0 ? 1.0 - 1e-9 : 1.0);",
+    ),
+    "restitution falls with speed by another exponent": (
+        "core/contact/contact_law.c",
+        "sqrt(sqrt(approach_velocity / law->yield_velocity))",
+        "pow(approach_velocity / law->yield_velocity, 0.25 + 1e-9)",
+    ),
+    "a summed chatter ends 1e-6 too late": (
+        "core/body/chatter.c",
+        "vi_max(0.0, sum.duration)",
+        "vi_max(0.0, sum.duration * (1.0 + 1e-6))",
+    ),
+    "a summed chatter is summed without its slope": (
+        "core/body/chatter.c",
+        "- t * t / 3.0 * (b->slope / b->pressure)",
+        "- t * t / 3.0 * (0.0 * b->slope / b->pressure)",
+    ),
+    "a graze counts as an impact": (
+        "core/body/chatter.c",
+        "return approach * approach <= 2.0 * fabs(acceleration) * resolution;",
+        "return approach * approach <= 0.0 * fabs(acceleration) * resolution;",
+    ),
+    "the impulse of a summed chatter is off by 1e-6": (
+        "core/body/modal/structure_impact.c",
+        "(1.0 + restitution) * rebound / (view.mobility",
+        "(1.0 + restitution) * (1.0 + 1e-6) * rebound / (view.mobility",
+    ),
+    "the wanted change of velocity is off by 1e-9": (
+        "core/body/modal/structure_impact.c",
+        "(1.0 + restitution[k]) * approach[k]",
+        "(1.0 + restitution[k]) * (1.0 + 1e-9) * approach[k]",
+    ),
+    "impacts count nothing as loss": (
+        "core/body/modal/structure_impact.c",
+        "state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;",
+        "state->energies.contact_loss += 0.0 * before;",
+    ),
+    "rebound in lanes of AVX2 alone is off by 1e-9": (
+        "core/lanes/rounds.h",
+        "const vector after = restitution * approach;",
+        "const vector after = restitution * approach * (VI_WIDTH == 4 ? 1.0 - 1e-9 : 1.0);",
+    ),
+    "rebound in lanes of one mode is off by 1e-9": (
+        "core/lanes/rounds.h",
+        "const vector after = restitution * approach;",
+        "const vector after = restitution * approach * (1.0 - 1e-9);",
+    ),
+    "lanes look at the curve of a cell too boldly": (
+        "core/lanes/rounds.h",
+        "const vector bulge = 0.125 * s->second;",
+        "const vector bulge = 0.0125 * s->second;",
+    ),
+    "lanes leave a contact without the look just after it": (
+        "core/lanes/rounds.h",
+        "passes = (passes & ~here) | (left & here);",
+        "passes = passes | (left & here);",
+    ),
+    "the phase of a cell in lanes turns the other way": (
+        "core/lanes/rounds.h",
+        "cell->sine = s->sine * c + s->cosine * n;",
+        "cell->sine = s->sine * c - s->cosine * n;",
+    ),
+    "the low part of the period is lost": (
+        "core/motion/clock.c",
+        "clock->period_low = (fma(-clock->period, angular_frequency, TWO_PI) + TWO_PI_LOW) / angular_frequency;",
+        "clock->period_low = 0.0;",
+    ),
+    "the decay of a mode is off by 1e-9": (
+        "core/motion/flow.c",
+        "mode->decay = damping / (2.0 * mass);",
+        "mode->decay = damping / (2.0 * mass) * (1.0 + 1e-9);",
+    ),
+    "modes of uniform chains alone are off by 1e-9": (
+        "core/modes/chain_modes.c",
+        "const double scale = 2.0 * sqrt(chain->stiffness[0] / chain->mass[0]);",
+        "const double scale = 2.0 * (1.0 + 1e-9) * sqrt(chain->stiffness[0] / chain->mass[0]);",
+    ),
+    "shapes of chains alone are off by 1e-9": (
+        "core/modes/chain_modes.c",
+        "const double size = 2.0 / sqrt((double)of * chain->mass[0]);",
+        "const double size = 2.0 * (1.0 + 1e-9) / sqrt((double)of * chain->mass[0]);",
+    ),
+    "a power law presses as if damped a little more": (
+        "core/contact/press.h",
+        "press->damping * rate + (press->kind == VI_PRESS_POWER ? 1.0 : press->stiffness * depth)",
+        "press->damping * (1.0 + 1e-9) * rate + (press->kind == VI_PRESS_POWER ? 1.0 : press->stiffness * depth)",
+    ),
+    "a relaxing surface comes back 1e-6 faster": (
+        "core/body/modal/structure_contact.c",
+        "tau = s->contacts[k].relaxation_time;",
+        "tau = s->contacts[k].relaxation_time * (1.0 - 1e-6);",
+    ),
+    "quadratic damping is off by 1e-9": (
+        "core/motion/amplitude.c",
+        "double added = law->damping_slope * amplitude;",
+        "double added = law->damping_slope * (1.0 + 1e-9) * amplitude;",
+    ),
+}
+"""Of each fault the file, what stands there once, and what stands there instead."""
+CASES, SECONDS = len(CHOSEN), 900.0
+
+
+def fault_of(name: str) -> Fault:
+    """Return a chosen fault."""
+    file, old, new = CHOSEN[name]
+    start = (NATIVE / file).read_text(encoding="utf-8").index(old)
+    return Fault(file, start, start + len(old), new, name)
+
+
+def check(seed: int) -> str | None:
+    """Try a fault; return it where it survives."""
+    return tried([fault_of(list(CHOSEN)[seed % SEED_STRIDE])])
