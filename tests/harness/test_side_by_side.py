@@ -81,7 +81,8 @@ def test_a_worker_that_dies_fails_its_test_and_all_others_are_run(suite: Path) -
 def test_the_first_failure_ends_the_session_where_that_is_asked(suite: Path) -> None:
     done = run(suite, "--side-by-side", "2", "-x")
     assert "1 failed" in counts(done) or "2 failed" in counts(done)
-    assert "stopping after 1 failures" in done.stdout
+    # the other worker's test may have failed meanwhile
+    assert re.search(r"stopping after [12] failures", done.stdout)
 
 
 @pytest.mark.parametrize(("kept", "code"), [(1e9, 0), (1.0, 1)])
