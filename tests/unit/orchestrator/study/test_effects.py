@@ -63,10 +63,12 @@ def test_a_free_mass_needs_its_forcing() -> None:
 
 def test_what_is_kept_changes_no_motion_and_what_moves_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vibroimpact.orchestrator.study.effects.PAIRS", 2)
-    scene = Scene.from_dict(BEAM)
+    # 67,000 samples are nearly all of the run, so that no other process changes the order
+    record = BEAM["record"] | {"time_series": {"rate": 100_000.0}}
+    scene = Scene.from_dict(BEAM | {"record": record})
     shares = {share.effect.name: share for share in shares_of(scene, effects_of(scene))}
     assert next(iter(shares)) == "time series"  # the dearest
-    assert shares["time series"].share > 0.2
+    assert shares["time series"].share > 0.5
     assert shares["time series"].change == 0.0
     assert shares["restitution stop"].changes.startswith("loses ")
     assert all(share.seconds.shape == (2,) for share in shares.values())
