@@ -1,0 +1,41 @@
+"""Ways that take memory as a library in C does, of which Python knows nothing."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import mmap
+
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.study.memory import memory_in_fork
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.way import Trial, Way
+
+
+class OfC:
+    """Takes memory and frees it."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+
+    def run(self) -> Observation:
+        # not from malloc: it may hand out what was freed before, which is resident already
+        if self._size:
+            with mmap.mmap(-1, self._size) as block:
+                ctypes.memset(ctypes.addressof(ctypes.c_char.from_buffer(block)), 1, self._size)
+        return Observation()
+
+    def close(self) -> None:
+        return None
+
+
+def memories_of_c(sizes: list[int]) -> list[int]:
+    """Return the memory that is found of ways of these sizes, one after the other, bytes."""
+    return [memory_in_fork(_way_of(size)) for size in sizes]
+
+
+def _way_of(size: int) -> Way:
+    def opened(wrap: Wrapper | None) -> Trial:
+        return OfC(size)
+
+    return Way("of C", "", math.nan, {}, opened)
