@@ -254,7 +254,7 @@ def _row_checks(
         phase = value("impact_phase")
         yield "impact_phase", "0 <= phase < 2 pi rad or NaN", (phase < 0) | (phase >= 2 * np.pi)
         yield "impact_velocity", "a speed of approach >= 0", ~(value("impact_velocity") >= 0)
-        for name in ("impact_restitution", "impact_duration"):
+        for name in ("impact_restitution", "impact_duration", "impact_peak_force"):
             if name in dataset.variables:
                 yield name, "a number >= 0 or NaN", value(name) < 0
     if dimension in ("impact", "stick"):

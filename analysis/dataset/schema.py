@@ -91,10 +91,11 @@ class RunRecord:
     periods : ndarray of float, shape (period, 5), or None
         Columns `PERIOD_COLUMNS`: displacement_max, displacement_min, strobe_displacement (m),
         strobe_velocity (m/s), impacts_per_period.
-    impacts : ndarray of float, shape (impact, 7), or None
+    impacts : ndarray of float, shape (impact, 8), or None
         Columns `IMPACT_COLUMNS`: impact_time (s), impact_phase (rad), impact_velocity (m/s),
-        impact_impulse (N s), impact_contact (1-based), impact_restitution, impact_duration (s). The last two
-        may be left out, and are NaN then. Of a contact that is open at the end they and the impulse are NaN.
+        impact_impulse (N s), impact_contact (1-based), impact_restitution, impact_duration (s),
+        impact_peak_force (N; NaN on a rigid stop). The last three may be left out, and are NaN then. Of a contact
+        that is open at the end they and the impulse are NaN.
     sticks : ndarray of float, shape (stick, 3), or None
         Columns `STICK_COLUMNS`: stick_start, stick_end (s; NaN: still stuck at the end), stick_contact.
     samples : ndarray of float, shape (sample, 1 + variables), or None
@@ -196,6 +197,7 @@ _RULES = (
     VariableRule("impact_contact", ("impact",), "1", "number of the stop that was hit, from 1", np.int8),
     VariableRule("impact_restitution", ("impact",), "1", "speed of separation over speed of approach"),
     VariableRule("impact_duration", ("impact",), "s", "duration of the contact, 0 for a rigid stop"),
+    VariableRule("impact_peak_force", ("impact",), "N", "largest force of a stop that yields"),
     _count("stick", "sticking phases"),
     VariableRule("stick_start", ("stick",), "s", "time at which sticking starts"),
     VariableRule("stick_end", ("stick",), "s", "time at which sticking ends, missing if it does not"),

@@ -81,7 +81,7 @@ class Motion:
         s, on the clock of the drive; without one, on that of the first channel compared.
     readings : tuple of ndarray, shape (sample,)
         One for each compared pair, in the SI unit of its channel.
-    impacts : ndarray, shape (impact, 7)
+    impacts : ndarray, shape (impact, 8)
         Columns `analysis.schema.IMPACT_COLUMNS`; times on the same clock.
     sticks : ndarray, shape (stick, 3)
         Columns `analysis.schema.STICK_COLUMNS`, on the same clock.

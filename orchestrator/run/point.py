@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
@@ -37,7 +37,7 @@ from vibroimpact.orchestrator.run.record import (
     RecordedBody,
     RunEnded,
 )
-from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
+from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan, few_samples_message
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
@@ -53,6 +53,7 @@ SAMPLES_OF_A_BLOCK = 16_384
 """Samples that are taken by one call, between two looks at the clock and for signals that C does not make itself."""
 
 TWO_PI = 2.0 * math.pi
+_DURATION = IMPACT_COLUMNS.index("impact_duration")
 Numbers = TypeVar("Numbers", float, NDArray[np.float64])
 
 
@@ -261,10 +262,14 @@ class _Run:
         """Return how a run ended that came to its end."""
         resting = self.driver.sticks_open()
         pressed = [(contact, start) for contact, start in resting if self._load(contact) > 0.0]
-        if pressed and self._rests_for_ever(pressed):
-            return Outcome.stuck, ""
         idle = [contact for contact, _ in resting if contact not in dict(pressed)]
-        return Outcome.ok, no_load_message(idle[0]) if idle else ""
+        stuck = bool(pressed) and self._rests_for_ever(pressed)
+        remarks = [no_load_message(idle[0])] if idle and not stuck else []
+        if self.plan.feels_contacts:
+            durations = self.driver.impacts()[:, _DURATION]
+            rate, has_peaks = self.scene.sampling_rate, self.scene.record.impacts
+            remarks.append(few_samples_message(durations, rate, has_peaks=has_peaks))
+        return Outcome.stuck if stuck else Outcome.ok, "; ".join(filter(None, remarks))
 
     def _load(self, contact: int) -> float:
         """Return the force that presses the body on a stop now, N."""
@@ -281,7 +286,8 @@ class _Run:
 
     def _begin_recording(self) -> None:
         record = self.scene.record
-        impacts = record.impacts or (self.measured is not None and self.measured.needs_impacts)
+        measured = self.measured is not None and self.measured.needs_impacts
+        impacts = record.impacts or measured or self.plan.feels_contacts
         self.driver.record(impacts=impacts, extrema=record.extrema, periods=self._has_periods())
 
     def _has_periods(self) -> bool:

@@ -21,7 +21,9 @@ from vibroimpact.orchestrator.importer.events import StepWatcher
 
 ROW_WIDTH = 8
 ROW_CAPACITY = 512
-ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
+ROW_IMPACT, ROW_STICK, ROW_PERIOD, ROW_PEAK = 1.0, 2.0, 3.0, 4.0
+IMPACT_WIDTH = 8
+"""Columns of an impact: those of its row, and the largest force, whose row comes after it."""
 _NOTHING: NDArray[np.float64] = np.empty(0)
 OBSERVED = ("displacement", "velocity")
 TOUCH_DOWN = ("last_time", "last_phase", "last_velocity")
@@ -94,10 +96,26 @@ def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return rows[np.argsort(time, kind="stable")] if (np.diff(time) < 0.0).any() else rows
 
 
+def impact_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the impacts of a record with the largest force of each, NaN where the stop does not yield; shape (n, 8).
+
+    Parameters
+    ----------
+    rows : ndarray, shape (row, 8)
+        As a body has written them: the row of a largest force comes after that of its impact.
+    """
+    places = np.flatnonzero(rows[:, 0] == ROW_IMPACT)
+    found = np.full((len(places), IMPACT_WIDTH), np.nan)
+    found[:, :-1] = rows[places, 1:]
+    has_peak = np.append(rows[1:, 0] == ROW_PEAK, False)[places]
+    found[has_peak, -1] = rows[places[has_peak] + 1, 3]
+    return found
+
+
 def open_contacts(
     touch_downs: NDArray[np.float64], contacts: NDArray[np.floating[Any]]
 ) -> NDArray[np.float64]:
-    """Return the impacts of contacts that are open, shape (n, 7): impulse, restitution and duration are NaN.
+    """Return the impacts of contacts that are open, shape (n, 8): all that is known at their end is NaN.
 
     Parameters
     ----------
@@ -109,9 +127,9 @@ def open_contacts(
     Examples
     --------
     >>> open_contacts(np.array([[2.0, 0.5, 0.1]]), np.array([1.0])).tolist()
-    [[2.0, 0.5, 0.1, nan, 1.0, nan, nan]]
+    [[2.0, 0.5, 0.1, nan, 1.0, nan, nan, nan]]
     """
-    rows = np.full((len(contacts), ROW_WIDTH - 1), np.nan)
+    rows = np.full((len(contacts), IMPACT_WIDTH), np.nan)
     rows[:, :3], rows[:, 4] = touch_downs, contacts
     return rows
 
@@ -121,6 +139,10 @@ class Rows:
     """Rows taken from a body's record, in the order they were written; shape (row, 8) each."""
 
     blocks: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def impacts(self) -> NDArray[np.float64]:
+        """Return the impacts with their largest forces, shape (n, 8)."""
+        return impact_rows(np.concatenate([np.empty((0, ROW_WIDTH)), *self.blocks]))
 
     def of_kind(self, kind: float) -> NDArray[np.float64]:
         """Return the rows of one kind without the column of the kind, shape (n, 7)."""
@@ -244,20 +266,20 @@ class RecordedBody(ABC):
             self._taken.set()
 
     def impacts(self) -> NDArray[np.float64]:
-        """Return the impacts so far by time of touch-down, shape (n, 7): columns `schema.IMPACT_COLUMNS`.
+        """Return the impacts so far by time of touch-down, shape (n, 8): columns `schema.IMPACT_COLUMNS`.
 
-        A contact that is open has no impulse, restitution and duration yet: NaN.
+        A contact that is open has no impulse, restitution, duration and largest force yet: NaN.
         """
         self.take_rows()
-        return in_time_order(np.concatenate([self.rows.of_kind(ROW_IMPACT), self._contacts_open()]))
+        return in_time_order(np.concatenate([self.rows.impacts(), self._contacts_open()]))
 
     def _contacts_open(self) -> NDArray[np.float64]:
-        """Return the contacts with stops that yield that began in the recording and go on, shape (n, 7)."""
+        """Return the contacts with stops that yield that began in the recording and go on, shape (n, 8)."""
         if self._open is None or self._touch_downs is None or self._stuck is None:
-            return np.empty((0, ROW_WIDTH - 1))
+            return np.empty((0, IMPACT_WIDTH))
         going = np.flatnonzero(self._open.get() & ~self._stuck.get())
         if not len(going):
-            return np.empty((0, ROW_WIDTH - 1))
+            return np.empty((0, IMPACT_WIDTH))
         return open_contacts(self._touch_downs.get().reshape(-1, len(TOUCH_DOWN))[going], going + 1.0)
 
     def sticks(self) -> NDArray[np.float64]:

@@ -241,7 +241,7 @@ class Session:
         return driver.hold(ends, np.ascontiguousarray(forces, dtype=np.float64), self._plan.variables)
 
     def impacts(self) -> Floats:
-        """Return the impacts so far, shape (impact, 7): columns `analysis.schema.IMPACT_COLUMNS`."""
+        """Return the impacts so far, shape (impact, 8): columns `analysis.schema.IMPACT_COLUMNS`."""
         return self._driver.impacts()
 
     def sticks(self) -> Floats:

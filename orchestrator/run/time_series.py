@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
-from vibroimpact.orchestrator.scene.models import Forcing
+from vibroimpact.orchestrator.scene.models import Forcing, RestitutionStop
 from vibroimpact.orchestrator.scene.sampled_names import fmu_variables, follow_energies, forced_mass
+
+FEWEST_SAMPLES = 10
+"""Samples of a contact; with fewer they miss its largest force."""
 
 
 class TimeSeriesPlan:
@@ -34,6 +37,8 @@ class TimeSeriesPlan:
         The variables of the body's FMU that they are made of, each once.
     energies : bool
         Whether the body must follow its energies for them.
+    feels_contacts : bool
+        Whether a contact with a stop that yields shows in them: in a force or an acceleration.
     """
 
     def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
@@ -44,6 +49,9 @@ class TimeSeriesPlan:
         parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
         self.energies = scene.body.kind != "oscillator" and follow_energies(self.names)
+        yields = any(not isinstance(stop, RestitutionStop) for stop in scene.stops)
+        felt = ("contact_force", "acceleration")
+        self.feels_contacts = yields and any(name.startswith(felt) for name in self.names)
         # a beam knows that its base moves; the others see it as forces on their masses only
         self._relative = scene.body.kind != "beam"
         self._columns = [[self.variables.index(variable) for variable in part] for part in parts]
@@ -134,6 +142,36 @@ class TimeSeriesPlan:
             if name.startswith("acceleration"):
                 found[:, column] += base
         return found
+
+
+def few_samples_message(durations: NDArray[np.float64], rate: float, *, has_peaks: bool) -> str:
+    """Return what a run says whose samples miss largest forces, as contacts have too few; nothing where they do not.
+
+    Parameters
+    ----------
+    durations : ndarray, shape (impact,)
+        Of contacts, s; 0 of a rigid stop, NaN of one that has not ended.
+    rate : float
+        Of the samples, Hz.
+    has_peaks : bool
+        Whether impacts are recorded, and their largest forces with them.
+
+    Examples
+    --------
+    >>> few_samples_message(np.array([2e-4, 4e-3, 0.0, np.nan]), 5000.0, has_peaks=True)[:62]
+    '1 of 2 contacts with fewer than 10 samples, the shortest has 1'
+    """
+    known = durations[durations > 0.0]
+    short = known[known * rate < FEWEST_SAMPLES]
+    if not len(short):
+        return ""
+    needed = math.ceil(float(f"{FEWEST_SAMPLES / short.min():.2g}"))
+    where = "impact_peak_force has them" if has_peaks else "impact_peak_force of recorded impacts has them"
+    return (
+        f"{len(short)} of {len(known)} contacts with fewer than {FEWEST_SAMPLES} samples, the shortest has "
+        f"{short.min() * rate:.2g}: the time series misses their largest forces. {where}, "
+        f"and a rate of {needed} would show them"
+    )
 
 
 def _cosines(

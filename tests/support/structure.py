@@ -26,7 +26,7 @@ DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, UNFINISHED = 0, 2, 3, 4, 8
 GIVEN_UP = (5, 6, 7)
 MESSAGE_LENGTH = 1024
 ROW_WIDTH, ROW_CAPACITY = 8, 512
-ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
+ROW_IMPACT, ROW_STICK, ROW_PERIOD, ROW_PEAK = 1.0, 2.0, 3.0, 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,6 +331,11 @@ class Structure:
         Columns: 1, time, phase, velocity, impulse, contact, restitution, duration.
         """
         return self._rows.of_kind(ROW_IMPACT)
+
+    @property
+    def peaks(self) -> Array:
+        """Largest forces on stops that yield, one for each impact, shape (impacts, 8): 4, time, contact, force."""
+        return self._rows.of_kind(ROW_PEAK)
 
     @property
     def sticks(self) -> Array:

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.analysis.figures.page import (
     COLOURS,
+    MARK,
     STOP,
     Floats,
     canvas,
@@ -40,6 +41,7 @@ _LINE_LETTERS = 7
 _MOST_LINES, _TICKS_FROM = 25, 0.94
 # What tells variables of one quantity apart: contact_displacement_1, displacement_2; energy_kinetic, energy_potential.
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
+_CONTACT_FORCE = re.compile(r"contact_force(?:_([0-9]+))?$")
 # What happens at an instant, and the variable with its times.
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
@@ -75,8 +77,9 @@ def draw_series(dataset: xr.Dataset, view: View) -> Figure:
         lines = _draw_lines(axis, samples["time"].values, variables)
         _draw_stops(axis, dataset, variables)
         marks = _draw_instants(axis, kind, instants)
+        peaks = _draw_peaks(axis, dataset, view.run, part, variables)
         # What the marks are is said once, above the first panel.
-        _name_lines(axis, variables, lines, marks if axis is axes[0] else [])
+        _name_lines(axis, variables, lines, [*(marks if axis is axes[0] else []), *peaks])
         axis.margins(x=0.0)
     axes[-1].xaxis.set_major_locator(MaxNLocator(6))
     axes[-1].set_xlabel(label(samples["time"]) + words)
@@ -194,6 +197,38 @@ def _draw_instants(axis: Axes, kind: str, instants: Floats) -> list[Artist]:
         rasterized=True,
     )
     return [marks]
+
+
+def _draw_peaks(
+    axis: Axes, dataset: xr.Dataset, run: int | None, part: tuple[float, float], variables: list[xr.DataArray]
+) -> list[Artist]:
+    """Draw the largest force of each contact over its duration: samples may miss it."""
+    forces = [_CONTACT_FORCE.match(str(variable.name)) for variable in variables]
+    if "impact_peak_force" not in dataset.variables or not any(forces):
+        return []
+    hits = dataset.vibroimpact.impacts(**selected(run))
+    begin, peak = hits["impact_time"].values, hits["impact_peak_force"].values
+    end = begin + hits["impact_duration"].values
+    shown = np.isfinite(peak) & (end >= part[0]) & (begin <= part[1])
+    artists: list[Artist] = []
+    for place, force in enumerate(forces):
+        stop = force and force.group(1)
+        own = shown & (hits["impact_contact"].values == int(stop)) if stop else shown
+        if force is None or not own.any():
+            continue
+        colour = COLOURS[place % len(COLOURS)] if len(variables) > 1 else MARK
+        axis.hlines(peak[own], begin[own], end[own], color=colour, linewidth=0.6, rasterized=True)
+        middle = 0.5 * (begin[own] + end[own])
+        artists += axis.plot(
+            middle,
+            peak[own],
+            ".",
+            color=colour,
+            markersize=2.5,
+            label="largest of a contact",
+            rasterized=True,
+        )
+    return artists[:1]
 
 
 def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], marks: list[Artist]) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import IMPACT_COLUMNS, STICK_COLUMNS, Outcome, RunRecord
+from vibroimpact.analysis.dataset import STICK_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.core.runs import address
@@ -19,12 +19,12 @@ from vibroimpact.orchestrator.run.many_points.loop_rows import (
     LISTEN_SECONDS,
     final_phases,
     period_table,
-    ragged_rows,
+    ragged_of,
     run_loop,
 )
 from vibroimpact.orchestrator.run.parameters import oscillator_start
 from vibroimpact.orchestrator.run.point import limit_message
-from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH
+from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH, impact_rows
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 
 ROWS_ROOM = 65_536
@@ -335,7 +335,9 @@ class _LaneRun:
         frequency, phase = (self._given[name][run] for name in ("angular_frequency", "phase"))
         no_sticks = Ragged(np.zeros(len(run), dtype=np.int64), np.empty((0, len(STICK_COLUMNS))))
         impacts = (
-            ragged_rows(rows, owner, len(run), ROW_IMPACT, len(IMPACT_COLUMNS)) if record.impacts else None
+            ragged_of(impact_rows(rows), owner[rows[:, 0] == ROW_IMPACT], len(run))
+            if record.impacts
+            else None
         )
         return RunColumns(
             outcome=outcome,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import IMPACT_COLUMNS, STICK_COLUMNS, Outcome, RunRecord
+from vibroimpact.analysis.dataset import STICK_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
 from vibroimpact.fmus.core import runs as core
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PreparedPoints
@@ -24,6 +24,7 @@ from vibroimpact.orchestrator.run.record import (
     ROW_STICK,
     ROW_WIDTH,
     TOUCH_DOWN,
+    impact_rows,
     in_time_order,
     open_contacts,
 )
@@ -256,28 +257,25 @@ class _Loop:
         run, contact = np.nonzero(arrays["open"] & ~arrays["stuck"])
         width = len(TOUCH_DOWN)
         touch_downs = self._of_contacts(arrays, 2, width).reshape(len(arrays["stuck"]), -1, width)
-        still = np.full((len(run), ROW_WIDTH), ROW_IMPACT)
-        still[:, 1:] = open_contacts(touch_downs[run, contact], contact + 1.0)
-        return _with_open(rows, owner, still, run, len(arrays["stuck"]), ROW_IMPACT, len(IMPACT_COLUMNS))
+        still = open_contacts(touch_downs[run, contact], contact + 1.0)
+        own = owner[rows[:, 0] == ROW_IMPACT]
+        return _with_open(impact_rows(rows), own, still, run, len(arrays["stuck"]))
 
     def _sticks(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
         """Return the sticks of each point, those that have not ended among them."""
         run, contact = np.nonzero(arrays["stuck"] & arrays["open"])
-        still = np.full((len(run), ROW_WIDTH), np.nan)
-        still[:, 0], still[:, 3] = ROW_STICK, contact + 1.0
-        still[:, 1] = self._of_contacts(arrays, 0)[run, contact]
-        return _with_open(rows, owner, still, run, len(arrays["stuck"]), ROW_STICK, len(STICK_COLUMNS))
+        starts = self._of_contacts(arrays, 0)[run, contact]
+        still = np.column_stack([starts, np.full(len(run), np.nan), contact + 1.0])
+        ended = rows[:, 0] == ROW_STICK
+        found = rows[ended, 1 : 1 + len(STICK_COLUMNS)]
+        return _with_open(found, owner[ended], still, run, len(arrays["stuck"]))
 
 
-def _with_open(
-    rows: Floats, owner: Ints, still: Floats, run: Ints, done: int, kind: float, columns: int
-) -> Ragged:
-    """Return the rows of a kind by their run, with those of what has not ended in it."""
-    ended = rows[:, 0] == kind
-    owners = np.concatenate([owner[ended], run])
+def _with_open(found: Floats, owner: Ints, still: Floats, run: Ints, done: int) -> Ragged:
+    """Return rows by their run, with those of what has not ended in it."""
+    owners = np.concatenate([owner, run])
     order = np.argsort(owners, kind="stable")
-    together = np.concatenate([rows[ended], still])[order]
-    return ragged_rows(together, owners[order], done, kind, columns)
+    return ragged_of(np.concatenate([found, still])[order], owners[order], done)
 
 
 def final_phases(
@@ -299,10 +297,8 @@ def period_table(rows: Floats, owner: Ints, done: int) -> Floats:
     return table
 
 
-def ragged_rows(rows: Floats, owner: Ints, done: int, kind: float, columns: int) -> Ragged:
-    """Return the rows of a kind, those of each run in the order of their time."""
-    chosen = rows[:, 0] == kind
-    found, owner = rows[chosen, 1 : 1 + columns], owner[chosen]
+def ragged_of(found: Floats, owner: Ints, done: int) -> Ragged:
+    """Return rows of runs, those of each run in the order of their time; the rows of a run follow each other."""
     back = (np.diff(found[:, 0]) < 0.0) & (np.diff(owner) == 0)
     for run in np.unique(owner[1:][back]):
         own = slice(*np.searchsorted(owner, (run, run + 1)))

@@ -49,11 +49,13 @@ static void append(vi_record *record, const double row[VI_RECORD_WIDTH])
 }
 
 void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
-                       double restitution, double duration)
+                       double restitution, double duration, double peak_force)
 {
     if (record->impacts) {
         const double row[] = {VI_ROW_IMPACT, time, phase, velocity, impulse, (double)contact, restitution, duration};
+        const double peak[] = {VI_ROW_PEAK, time, (double)contact, peak_force, 0.0, 0.0, 0.0, 0.0};
         append(record, row);
+        append(record, peak);
     }
 }
 
@@ -61,7 +63,10 @@ void vi_record_impact(vi_record *record, double time, double phase, double veloc
                       double restitution)
 {
     record->period_impacts += 1;
-    vi_record_contact(record, time, phase, velocity, impulse, contact, restitution, 0.0);
+    if (record->impacts) {
+        const double row[] = {VI_ROW_IMPACT, time, phase, velocity, impulse, (double)contact, restitution, 0.0};
+        append(record, row);
+    }
 }
 
 void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse)

@@ -10,8 +10,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { VI_RECORD_CAPACITY = 512, VI_RECORD_WIDTH = 8, VI_RECORD_RESERVE = 4 };
-enum { VI_ROW_IMPACT = 1, VI_ROW_STICK = 2, VI_ROW_PERIOD = 3 };
+#include "sizes.h"
+
+/* One event writes two rows at most for each contact, and one of a period. */
+enum { VI_RECORD_CAPACITY = 512, VI_RECORD_WIDTH = 8, VI_RECORD_RESERVE = 2 * VI_PORTS + 1 };
+enum { VI_ROW_IMPACT = 1, VI_ROW_STICK = 2, VI_ROW_PERIOD = 3, VI_ROW_PEAK = 4 };
 
 typedef struct {
     /* inputs */
@@ -44,9 +47,10 @@ bool vi_record_full(const vi_record *record);
 
 void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                       double restitution);
-/* The whole contact with a compliant stop, written when it ends; its duration in s. Its period has counted it before. */
+/* The whole contact with a compliant stop, written when it ends; its duration in s, its largest force in N, in a row of
+ * its own after that of the impact. Its period has counted it before. */
 void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
-                       double restitution, double duration);
+                       double restitution, double duration, double peak_force);
 void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse);
 
 /* Let the extremes know of a displacement that the body has. */

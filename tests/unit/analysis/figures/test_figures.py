@@ -532,6 +532,25 @@ def test_more_than_displacement_and_velocity_is_drawn_in_panels_by_unit_with_mod
     assert figure.axes[-1].get_xlabel() == "time (s)"
 
 
+@pytest.mark.parametrize(
+    ("names", "shown"), [(["contact_force"], [2]), (["contact_force[1]", "contact_force[2]"], [1, 1])]
+)
+def test_largest_forces_of_contacts_are_drawn_beside_their_samples(
+    names: list[str], shown: list[int], tmp_path: Path
+) -> None:
+    time = np.linspace(0.0, 1.0, 20)
+    hits = [[0.25, 1.0, 0.5, 0.8, 1.0, 0.7, 0.02, 9.0], [0.61, 1.0, 0.5, 0.8, 2.0, 0.7, 0.02, 5.0]]
+    hits.append([0.98, 1.0, 0.5, np.nan, 1.0, np.nan, np.nan, np.nan])  # open at the end
+    samples = np.column_stack([time, *(np.sin(time) for _ in names)])
+    run = RunRecord(Outcome.ok, "", None, np.array(hits), np.empty((0, 3)), samples, 0.0, 0.0, 0.0, 1e-3)
+    figure = figures.draw(opened(dataset_of([run], coordinates={}, sample_variables=names), tmp_path))
+    (axis,) = figure.axes
+    dots = [line for line in axis.get_lines() if line.get_marker() == "."]
+    assert [len(line.get_xdata()) for line in dots] == shown
+    assert sorted(np.concatenate([line.get_xydata() for line in dots]).tolist()) == [[0.26, 9.0], [0.62, 5.0]]
+    assert "largest of a contact" in [text.get_text() for text in axis.get_legend().get_texts()]
+
+
 def test_a_stop_at_another_point_than_the_observed_one_is_not_drawn_as_its_limit() -> None:
     beam = '[body]\nkind = "beam"\n[[stop]]\nposition = 1.0\nlocation = {}\n'
     chain = '[body]\nkind = "chain"\nmasses = [1, 1]\nobserved_mass = {}\n[[stop]]\nposition = 1.0\n'

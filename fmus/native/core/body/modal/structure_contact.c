@@ -85,7 +85,7 @@ void vi_structure_touch_down(const vi_structure *s, int k)
         s->state->leaving[k] = approach > 0.0 ? 1 : 2;
     }
     s->state->touch_down[k] = (vi_touch_down){vi_clock_time(clock, s->state->now), vi_clock_phase(clock, s->state->now),
-                                              approach, 0.0, 0};
+                                              approach, 0.0, 0.0, 0};
     if (approach > 0.0) {
         count_once(s, k);
     }
@@ -144,7 +144,7 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
         count_once(s, k);
         if (!s->contacts[k].earlier) {
             vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
-                              vi_max(0.0, now - touch->time - late));
+                              vi_max(0.0, now - touch->time - late), touch->peak);
         }
     }
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;

@@ -157,29 +157,44 @@ static double climb(const vi_structure *s, const vi_pressed_flow *flow, vi_press
     }
 }
 
-/* Largest displacement * sign over the rest: what stays below the bar, the largest one seen, is passed over. */
-static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double sign, double fastest, double end)
+/* Raise the bar of a sight to the largest value over the rest: what stays below it is passed over. */
+static void raise_bar(const vi_structure *s, const vi_pressed_flow *flow, vi_pressed_sight *sight, double fastest,
+                      double end)
 {
-    const double bar = largest_so_far(s, sign);
-    vi_pressed_sight sight = vi_pressed_sight_of(flow, VI_SEEN_OBSERVED, sign, bar, end);
-    const double least = VI_ROUNDING * sight.scale;
+    const double least = VI_ROUNDING * sight->scale;
     vi_complex part[VI_TERMS];
     double u = 0.0;
     for (int evaluation = 0; u < end; ++evaluation) {
         const double least_step = vi_least_step(end, 1e-9, evaluation);
         vi_budget_spend(&s->state->budget, flow->pressed->modes.terms);
         vi_pressed_flow_parts(flow, u, part);
-        const vi_approach p = vi_pressed_approach(&sight, flow, part, u);
-        if (p.clearance <= least && p.velocity > speed_noise(&sight, p.velocity, fastest)) {
-            u = climb(s, flow, &sight, fastest, u, end) + least_step;
+        const vi_approach p = vi_pressed_approach(sight, flow, part, u);
+        if (p.clearance <= least && p.velocity > speed_noise(sight, p.velocity, fastest)) {
+            u = climb(s, flow, sight, fastest, u, end) + least_step;
             continue;
         }
         const double room = least + vi_max(0.0, -p.clearance);
-        sight.offset += room;
-        u += vi_max(vi_pressed_step(&sight, flow, part, u, end - u), least_step);
-        sight.offset -= room;
+        sight->offset += room;
+        u += vi_max(vi_pressed_step(sight, flow, part, u, end - u), least_step);
+        sight->offset -= room;
     }
+}
+
+/* Largest displacement * sign over the rest. */
+static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double sign, double fastest, double end)
+{
+    vi_pressed_sight sight = vi_pressed_sight_of(flow, VI_SEEN_OBSERVED, sign, largest_so_far(s, sign), end);
+    raise_bar(s, flow, &sight, fastest, end);
     vi_record_extend(s->record, vi_structure_within(s, sign * sight.offset));
+}
+
+/* Largest force over the rest of the i-th contact that is rested on. */
+static void peak(const vi_structure *s, const vi_pressed_flow *flow, int i, double fastest, double end)
+{
+    vi_touch_down *touch = &s->state->touch_down[flow->pressed->port[i]];
+    vi_pressed_sight sight = vi_pressed_sight_of(flow, VI_SEEN_FORCE + i, 1.0, touch->peak, end);
+    raise_bar(s, flow, &sight, fastest, end);
+    touch->peak = sight.offset;
 }
 
 /* ---- a rest ---- */
@@ -208,6 +223,9 @@ static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fast
         const int k = flow->pressed->port[i];
         if (state->status[k] == VI_CONTACT_YIELDING) {
             state->touch_down[k].impulse += vi_pressed_flow_impulse(flow, i, u);
+        }
+        if (vi_structure_follows_peak(s, k)) {
+            peak(s, flow, i, fastest, u);
         }
     }
     double before[VI_MODES];

@@ -17,6 +17,9 @@ static const double PIECE = 1.5;
 /* Pieces of a segment of drift, which may be 5 over the fastest rate. */
 enum { DRIFT_PIECES = 4 };
 
+/* Turns of a polynomial over one segment. */
+enum { MOST_TURNS = 16 };
+
 /* Evaluations that a climb is counted as. */
 enum { CLIMB = 8 };
 
@@ -97,9 +100,20 @@ static void differentiate(const double c[VI_ORDER + 1], double sign, double slop
     slope[VI_ORDER] = 0.0;
 }
 
+/* Where a polynomial turns round next after `from`; HUGE_VAL where it does not up to the end. */
+static double next_turn(const double polynomial[VI_ORDER + 1], double from, double end)
+{
+    double slope[VI_ORDER + 1], value[4];
+    vi_polynomial_at(polynomial, from, value);
+    const double sign = value[1] != 0.0 ? copysign(1.0, value[1]) : copysign(1.0, value[2]);
+    differentiate(polynomial, sign, slope);
+    const vi_fall fall = vi_polynomial_fall(slope, from, end, 4.0 * DBL_EPSILON * vi_polynomial_size(slope, end));
+    return fall.found ? fall.time : HUGE_VAL;
+}
+
 void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u)
 {
-    double polynomial[VI_ORDER + 1], slope[VI_ORDER + 1], value[4], from = 0.0;
+    double polynomial[VI_ORDER + 1], value[4], from = 0.0;
     const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
     const double end = vi_drift_variable(drift, u);
     vi_drift_point(drift, s->model->observed, polynomial);
@@ -109,17 +123,44 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
     if (vi_polynomial_size(polynomial, end) <= VI_ROUNDING * fabs(here)) {
         return; /* it is held: what its polynomial says is rounding */
     }
-    for (int turn = 0; turn < 16 && from < end; ++turn) {
-        vi_polynomial_at(polynomial, from, value);
-        const double sign = value[1] != 0.0 ? copysign(1.0, value[1]) : copysign(1.0, value[2]);
-        differentiate(polynomial, sign, slope);
-        const vi_fall fall = vi_polynomial_fall(slope, from, end, 4.0 * DBL_EPSILON * vi_polynomial_size(slope, end));
-        if (!fall.found) {
+    for (int turn = 0; turn < MOST_TURNS && from < end; ++turn) {
+        const double at = next_turn(polynomial, from, end);
+        if (!(at < HUGE_VAL)) {
             return;
         }
-        vi_polynomial_at(polynomial, fall.time, value);
+        vi_polynomial_at(polynomial, at, value);
         extend(s, here + value[0]);
-        from = fall.time + 1e-3 * end;
+        from = at + 1e-3 * end;
+    }
+}
+
+/* ---- largest forces ---- */
+
+/* The largest value of a polynomial from 0 to the end. */
+static double largest_value(const double polynomial[VI_ORDER + 1], double end)
+{
+    double value[4], from = 0.0;
+    vi_polynomial_at(polynomial, end, value);
+    double largest = vi_max(polynomial[0], value[0]);
+    for (int turn = 0; turn < MOST_TURNS && from < end; ++turn) {
+        const double at = next_turn(polynomial, from, end);
+        if (!(at < HUGE_VAL)) {
+            return largest;
+        }
+        vi_polynomial_at(polynomial, at, value);
+        largest = vi_max(largest, value[0]);
+        from = at + 1e-3 * end;
+    }
+    return largest;
+}
+
+void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (vi_structure_follows_peak(s, k)) {
+            const double largest = largest_value(drift->force[k], vi_drift_variable(drift, u));
+            s->state->touch_down[k].peak = vi_max(s->state->touch_down[k].peak, largest);
+        }
     }
 }
 

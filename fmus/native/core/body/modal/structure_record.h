@@ -19,6 +19,11 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
 void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const double q[], const double held[],
                              double u);
 
+/* ---- largest forces of contacts that yield ---- */
+
+/* Of the contacts whose impacts are recorded, over the first u seconds of a drift; its thin contacts have no force there. */
+void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u);
+
 /* ---- extremes of the observed point ---- */
 
 void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u);

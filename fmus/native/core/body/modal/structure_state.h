@@ -68,6 +68,7 @@ typedef struct {
 typedef struct {
     double time, phase, velocity; /* when and how fast it began, s, rad, m/s */
     double impulse;               /* so far, N s */
+    double peak;                  /* largest force so far, N; followed where the contact is recorded */
     int64_t counted;              /* a period has counted it */
 } vi_touch_down;
 
@@ -232,6 +233,12 @@ double vi_structure_velocity_size(const vi_structure *s, int k);
 /* More than the size of the acceleration of contact k, m/s^2, which costs less to know; HUGE_VAL where a stop presses, or an
  * input slopes. */
 double vi_structure_most_acceleration(const vi_structure *s, int k);
+
+/* Is the largest force of contact k followed? Only where its impact is recorded. */
+static inline bool vi_structure_follows_peak(const vi_structure *s, int k)
+{
+    return s->record->impacts && s->state->status[k] == VI_CONTACT_YIELDING && !s->contacts[k].earlier;
+}
 
 /* Is this contact looked for? */
 static inline bool vi_structure_watched(const vi_structure *s, int k)

@@ -110,6 +110,11 @@ void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, do
     vi_structure_push(s, k, impulse, s->state->p);
     vi_structure_push(s, k, impulse < whole ? strength * moment * (impulse / whole) : strength * moment, s->state->q);
     s->state->touch_down[k].impulse += impulse;
+    if (vi_structure_follows_peak(s, k)) {
+        const double deepest = vi_max(vi_max(0.0, depth), depth + rate * u);
+        const double largest = strength * pow(deepest, press.exponent);
+        s->state->touch_down[k].peak = vi_max(s->state->touch_down[k].peak, largest);
+    }
 }
 
 double vi_thin_part(const vi_structure *s, const vi_drift *drift, const int thin[], const double at[], int k, double u,
