@@ -3,6 +3,8 @@
 #ifndef VIBROIMPACT_PRESS_H
 #define VIBROIMPACT_PRESS_H
 
+#include <stdint.h>
+
 typedef enum {
     VI_PRESS_NONE = 0,
     VI_PRESS_HOLD = 1,   /* the force that keeps the contact at rest */
@@ -12,7 +14,7 @@ typedef enum {
 
 /* How a contact presses; d = sign (displacement - position) is its penetration. */
 typedef struct {
-    vi_press_kind kind;
+    int64_t kind; /* vi_press_kind; 64 bits: no padding */
     double constant, stiffness, damping, exponent;
 } vi_press;
 

@@ -60,7 +60,7 @@ static void set_up_contacts(equation *e, const vi_structure_model *model, const 
 {
     e->yielding = e->any_held = e->any_power = 0;
     for (int k = 0; k < model->contacts; ++k) {
-        const vi_press_kind kind = start->press[k].kind;
+        const int64_t kind = start->press[k].kind;
         e->is_held[k] = kind == VI_PRESS_HOLD;
         e->any_held |= e->is_held[k];
         e->any_power |= kind == VI_PRESS_POWER;

@@ -301,7 +301,9 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     *state = fresh;
     s->model->asks = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
-        s->model->stop[k] = (int32_t)vi_law_of(s->contacts[k].law.law)->stop;
+        const vi_law *law = vi_law_of(s->contacts[k].law.law);
+        s->model->stop[k] = (int32_t)law->stop;
+        s->model->press[k] = vi_law_press(law, &s->contacts[k].law);
         s->model->asks |= vi_contact_law_asks(s->contacts[k].law.law);
         vi_contact_clear(&s->contacts[k]);
         s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;

@@ -250,7 +250,9 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     if (state->follow_energies) {
         follow_energies(s, &drift, &now, u);
     }
-    vi_peaks_of_drift(s, &drift, u);
+    if (s->record->impacts) {
+        vi_peaks_of_drift(s, &drift, u);
+    }
     double q[VI_MODES];
     memcpy(q, state->q, sizeof q);
     vi_drift_at(&drift, u, q, state->p, state->q);

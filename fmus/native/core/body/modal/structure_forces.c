@@ -12,34 +12,32 @@ static vi_press followed_force(const vi_structure *s, int k)
     return (vi_press){VI_PRESS_LINEAR, constant, contact->applied_stiffness, contact->applied_damping, 1.0};
 }
 
-static inline vi_press stop_press(const vi_structure *s, int k, const vi_law *law)
+static inline vi_press stop_press(const vi_structure *s, int k)
 {
-    return law->external ? followed_force(s, k) : vi_law_press(law, &s->contacts[k].law);
+    return vi_contact_law_is_external(s->contacts[k].law.law) ? followed_force(s, k) : s->model->press[k];
 }
 
 vi_press vi_structure_stop_press(const vi_structure *s, int k)
 {
-    return stop_press(s, k, vi_law_of(s->contacts[k].law.law));
+    return stop_press(s, k);
 }
 
 vi_press vi_structure_press(const vi_structure *s, int k)
 {
     switch (s->state->status[k]) {
     case VI_CONTACT_HELD: return (vi_press){.kind = VI_PRESS_HOLD};
-    case VI_CONTACT_YIELDING: return stop_press(s, k, vi_law_of(s->contacts[k].law.law));
+    case VI_CONTACT_YIELDING: return stop_press(s, k);
     default: return (vi_press){.kind = VI_PRESS_NONE};
     }
 }
 
 vi_contact_force vi_structure_yield(const vi_structure *s, int k)
 {
-    const vi_law *law = vi_law_of(s->contacts[k].law.law);
     const double d = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
-    if (law->press == VI_PRESS_POWER) {
-        const vi_press press = vi_law_press(law, &s->contacts[k].law);
-        return vi_law_force(law, &press, d, rate);
+    const vi_press press = stop_press(s, k);
+    if (press.kind == VI_PRESS_POWER) {
+        return vi_law_force(vi_law_of(s->contacts[k].law.law), &press, d, rate);
     }
-    const vi_press press = stop_press(s, k, law);
     const double force = press.constant + press.stiffness * d + press.damping * rate;
     /* an integrator looks beyond the end of a contact before it finds it: there the force goes on smoothly */
     const double least = s->state->exchange.on ? force : 0.0;

@@ -42,6 +42,7 @@ typedef struct {
     /* derived by vi_structure_prepare */
     int32_t at_observed[VI_PORTS];         /* is the contact at the observed point? */
     int32_t stop[VI_PORTS];                /* vi_stop_kind of the contact's law; derived by vi_structure_start */
+    vi_press press[VI_PORTS];              /* of a stop that yields and is no other component's; derived likewise */
     double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
     double mobility_low[VI_PORTS][VI_PORTS]; /* its rounding: else it adds up over elastic impacts, always one way */
     double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
