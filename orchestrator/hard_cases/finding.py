@@ -1,9 +1,10 @@
-"""Finding the contact: grazes, ripples, resonance, all dampings."""
+"""Finding the contact: grazes, ripples, resonance, all dampings, rates that are equal."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from decimal import Decimal, localcontext
 from functools import partial
 from typing import Any
 
@@ -167,6 +168,95 @@ def _dampings() -> Found:
     return _by_number(np.array(errors), "damping: 0, 1e-9, .5, 1-1e-9, 1, 1+1e-9, 3, 100")
 
 
+OFFSETS = np.array([-1e-4, -1e-8, -1e-12, 0.0, 1e-12, 1e-8, 1e-4])
+"""Relative change of the damping at which two rates are equal."""
+COUPLING = 0.25
+"""Stiffness k between two masses of 1: with springs of 1 + k^2 and 1 at them, and a dashpot of 2 k at the first, the
+characteristic polynomial is (s^2 + k s + 1)^2."""
+COMPARED = 6
+"""Impacts of a run that are compared with the power series."""
+DIGITS, TERMS, STRIDE = 30, 24, 0.5
+"""Digits and terms of the power series, and the time after which a new one begins: the last term is below 1e-23."""
+
+
+def _near_defective() -> Found:
+    """A critically damped oscillator and a chain with Jordan blocks, forced against a stop, and both beside that."""
+    k = COUPLING
+    springs = {"stiffnesses": [1.0 + k**2 - k, k], "far_stiffness": 1.0 - k}
+    coupled = np.array([[1.0 + k**2, -k], [-k, 1.0]])
+    errors = []
+    for offset in OFFSETS:
+        critical, block = 2.0 * (1.0 + float(offset)), 2.0 * k * (1.0 + float(offset))
+        chain = {"kind": "chain", "masses": [1.0, 1.0], "dampings": [block, 0.0], **springs}
+        errors.append(_off_series(np.eye(1), critical, 0.2, PLAIN | {"damping": critical}, 1.0))
+        errors.append(_off_series(coupled, block, 0.3, chain, [0.0, 1.0]))
+    off = np.array(errors).reshape(-1, 2).max(axis=1)
+    curve = Curve(OFFSETS, off, "damping beside the double rate (-)", "relative error of impacts (-)")
+    return Found(largest(off), curve)
+
+
+def _off_series(
+    stiffness: Floats, damping: float, stop: float, body: dict[str, Any], force: float | list[float]
+) -> float:
+    """Return the largest relative error of times and speeds of the first impacts."""
+    w, r = 0.9, 0.7
+    place = {"mass": 1} if "kind" in body else {}
+    record = run(
+        body=body,
+        forcing={"amplitude": force, "angular_frequency": w},
+        stop=[restitution(stop, r, **place)],
+        record={"recorded_periods": 5},
+    )
+    assert record.impacts is not None
+    first = record.impacts[:COMPARED, [IMPACT_TIME, IMPACT_VELOCITY]]
+    expected = impacts_by_series(stiffness, damping, w, stop, r)
+    return largest(relative(first, expected)) if len(first) == COMPARED else math.inf
+
+
+def impacts_by_series(stiffness: Floats, damping: float, w: float, stop: float, r: float) -> Floats:
+    """Return times and speeds of the first impacts, shape (impact, 2), in 30 digits.
+
+    Masses are 1. The first has the dashpot and the stop, the last the force cos(w t). A power series of the equations
+    of motion needs no eigenvalues.
+    """
+    n = len(stiffness)
+    matrix = np.zeros((2 * n + 2, 2 * n + 2))
+    matrix[:n, n : 2 * n], matrix[n : 2 * n, :n] = np.eye(n), -stiffness
+    matrix[n, n], matrix[2 * n - 1, 2 * n] = -damping, 1.0
+    matrix[2 * n, 2 * n + 1], matrix[2 * n + 1, 2 * n] = -w, w
+    exact = np.vectorize(Decimal, otypes=[object])
+    rates, state = exact(matrix), exact(np.eye(2 * n + 2)[2 * n])
+    grid = np.linspace(0.0, STRIDE, 11)[1:]
+    begun = Decimal(0)
+    impacts: list[list[float]] = []
+    with localcontext() as context:
+        context.prec = DIGITS
+        while len(impacts) < COMPARED:
+            series = [state]
+            for order in range(1, TERMS):
+                series.append(rates @ series[-1] / order)
+            places = np.polynomial.polynomial.polyval(grid, [float(term[0]) for term in series])
+            beyond = np.flatnonzero(places > stop)
+            step = Decimal(float(grid[beyond[0] if len(beyond) else -1]))
+            state = _summed(series, step)
+            if len(beyond):
+                for _ in range(6):  # of Newton's method
+                    step -= (state[0] - Decimal(stop)) / state[n]
+                    state = _summed(series, step)
+                impacts.append([float(begun + step), float(state[n])])
+                state[0], state[n] = Decimal(stop), -Decimal(r) * state[n]
+            begun += step
+    return np.array(impacts)
+
+
+def _summed(series: list[Any], step: Decimal) -> Any:
+    """Return the sum of a power series of states."""
+    total = series[-1]
+    for term in series[-2::-1]:
+        total = total * step + term
+    return total
+
+
 CASES = (
     HardCase(
         "grazing-from-above",
@@ -217,5 +307,15 @@ CASES = (
         "relative error of the time",
         7e-15,
         _dampings,
+    ),
+    HardCase(
+        "near-defective",
+        THEME,
+        "a critically damped oscillator, a chain with Jordan blocks, and dampings 1e-12 to 1e-4 beside",
+        "the first six impacts",
+        "power series of the equations of motion in 30 digits",
+        "relative error of times and speeds",
+        1.2e-13,
+        _near_defective,
     ),
 )

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, largest, relative
+from vibroimpact.orchestrator.hard_cases.case import Curve, Floats, Found, HardCase, largest, relative
+from vibroimpact.orchestrator.hard_cases.finding import first_root
 from vibroimpact.orchestrator.hard_cases.runs import (
     IMPACT_TIME,
     IMPACT_VELOCITY,
@@ -108,6 +109,55 @@ def _rocking() -> Found:
     return Found(largest(off), Curve(loads, off, "load (-)", "what is left of the motion (-)", x_log=True))
 
 
+BESIDE = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
+"""Distances of the stop from the middle of a pinned beam, over its length."""
+COMPARED = 6
+"""Impacts of each run."""
+OFF_THE_STOP = 1e-4
+"""Time after an impact at which the mode is off the stop, whatever the rounding."""
+
+
+def _beside_a_node() -> Found:
+    """A pinned beam swings in mode 2, and touches a stop next to its middle, where it hardly moves."""
+    off = np.array([_off_beside(0.5 + float(distance)) for distance in BESIDE])
+    words = "stop beside the node, each distance"
+    return Found(largest(off), Curve(np.arange(1.0, 1.0 + len(off)), off, words, "relative error (-)"))
+
+
+def _off_beside(location: float) -> float:
+    """Return the largest error of time and speed of the first impacts: mode 1 begins at rest, each impact moves it."""
+    angle, r = math.pi * (location - 0.5), 0.8
+    shapes = math.sqrt(2.0) * np.array([math.cos(angle), -math.sin(2.0 * angle)])
+    rates = math.pi**2 * np.array([1.0, 4.0])
+    start = -math.copysign(1.0, shapes[1])
+    place, velocity, stop = np.array([0.0, start]), np.zeros(2), 0.3 * abs(shapes[1])
+    expected, time = [], 0.0
+    for _ in range(COMPARED):
+        cosines, sines = shapes * place, shapes * velocity / rates
+
+        def beyond(u: Floats, c: Floats = cosines, s: Floats = sines) -> Floats:
+            turned = np.multiply.outer(u + OFF_THE_STOP, rates)
+            return np.asarray((np.cos(turned) @ c + np.sin(turned) @ s - stop) / stop)
+
+        flight = OFF_THE_STOP + first_root(beyond, 3.0)
+        c, s = np.cos(rates * flight), np.sin(rates * flight)
+        place, velocity = place * c + velocity / rates * s, velocity * c - place * rates * s
+        time, speed = time + flight, float(shapes @ velocity)
+        expected.append([time, speed])
+        velocity = velocity - (1.0 + r) * speed * shapes / (shapes @ shapes)
+    record = run(
+        body={
+            **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0, "modes": 2},
+            **{"boundary": "pinned-pinned", "displacement_start": [0.0, start]},
+        },
+        stop=[restitution(float(stop), r, location=location)],
+        record={"recorded_time": 1.001 * time},
+    )
+    assert record.impacts is not None
+    found = record.impacts[:, [IMPACT_TIME, IMPACT_VELOCITY]]
+    return largest(relative(found, np.array(expected))) if len(found) == COMPARED else math.inf
+
+
 CASES = (
     HardCase(
         "stop-at-a-node",
@@ -118,6 +168,16 @@ CASES = (
         "relative error of the motion",
         1e-12,
         _at_a_node,
+    ),
+    HardCase(
+        "beside-a-node",
+        THEME,
+        "a stop 1e-15 to 1e-9 of the length beside a node of the mode that swings",
+        "the first six impacts of the motion that is left there",
+        "both modes in closed form",
+        "relative error of times and speeds",
+        2e-14,
+        _beside_a_node,
     ),
     HardCase(
         "driven-at-a-node",

@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
 
 from vibroimpact.fmus.core.modes import beam_modes
-from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, largest, relative
-from vibroimpact.orchestrator.hard_cases.runs import STICK_END, STICK_START, kelvin_voigt, restitution, run
+from vibroimpact.orchestrator.hard_cases.case import Curve, Floats, Found, HardCase, largest, relative
+from vibroimpact.orchestrator.hard_cases.finding import first_root
+from vibroimpact.orchestrator.hard_cases.flights import (
+    QUARTER,
+    bounces,
+    first_impact,
+    released,
+    start_that_ends_at_the_turn,
+)
+from vibroimpact.orchestrator.hard_cases.runs import (
+    IMPACT_TIME,
+    IMPACT_VELOCITY,
+    PLAIN,
+    STICK_END,
+    STICK_START,
+    kelvin_voigt,
+    restitution,
+    run,
+)
 
 THEME = "Chatter, sticking, release"
 BEAM = {"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0}
@@ -117,6 +135,154 @@ def _chatter() -> Found:
     return Found(largest(off), Curve(coefficients, off, "restitution (-)", "relative error of the rest (-)"))
 
 
+TURNING = {"amplitude": 1.0, "angular_frequency": 1.0}
+FREE = {"mass": 1.0, "stiffness": 0.0}
+RELEASE_OFFSETS = np.array([-1e-2, -1e-5, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-5, 1e-2])
+"""Change of the velocity at the start: the bounces end before the release, at it, or not at all."""
+RESOLVED_OFFSET = 1e-9
+"""Offset from which on rounding does not decide whether the mass comes to rest."""
+WELL_BEFORE = 1e-2
+"""Offset from which on the instant of rest is well-conditioned."""
+BOUNCING = (0.3, 0.5, 0.7, 0.95)
+"""Restitutions."""
+COMPARED = 3
+"""First impacts that are compared: each multiplies an error by 1 to 5."""
+
+
+def _end_at_release() -> Found:
+    """A free mass under cos(t) bounces to rest as the load turns round, and next to it: where is it then?"""
+    errors = [
+        [
+            _off_bounces(r, abs(float(offset)), *start_that_ends_at_the_turn(r, float(offset)))
+            for r in BOUNCING
+        ]
+        for offset in RELEASE_OFFSETS
+    ]
+    off = np.array(errors).max(axis=1)
+    return Found(largest(off), Curve(RELEASE_OFFSETS, off, "change of the start (-)", "relative error (-)"))
+
+
+def _off_bounces(r: float, offset: float, place: float, velocity: float) -> float:
+    """Return the largest relative error of the first impacts, the rest, its end, and the end of the motion."""
+    record = run(
+        body=FREE | {"displacement_start": place, "velocity_start": velocity},
+        forcing=TURNING,
+        stop=[restitution(0.0, r)],
+        record={"recorded_periods": 1},
+    )
+    assert record.impacts is not None
+    assert record.sticks is not None
+    expected = bounces(*first_impact(place, velocity), r)
+    rests = not math.isnan(expected.rest)
+    first = record.impacts[:COMPARED, [IMPACT_TIME, IMPACT_VELOCITY]]
+    impacts = np.stack([QUARTER + np.array(expected.phases), expected.speeds], axis=1)[:COMPARED]
+    if first.shape != impacts.shape or (offset >= RESOLVED_OFFSET and bool(len(record.sticks)) != rests):
+        return math.inf
+    last = (0.0, 0.0) if rests else (expected.phases[-1], r * expected.speeds[-1])
+    end = np.array(released(*last, 3.0 * QUARTER))
+    off = [
+        relative(first, impacts),
+        relative(np.array([record.final_displacement, record.final_velocity]), end),
+    ]
+    off.append(relative(record.sticks[:1, STICK_END], QUARTER))
+    if rests and offset >= WELL_BEFORE:
+        off.append(relative(record.sticks[:1, STICK_START], QUARTER + expected.rest))
+    return largest(np.concatenate(off, axis=None))
+
+
+ROOMS = np.array([1e-3, 1e-6, 1e-9, 1e-12])
+TURNS = 10
+
+
+def _pressed_in_turn() -> Found:
+    """A free mass that cos(t) presses to two stops in turn: how far beside the stops are its impacts?"""
+    off = np.array([[_off_turns(float(room), r) for r in (0.3, 0.8)] for room in ROOMS]).max(axis=1)
+    curve = Curve(ROOMS, off, "room (-)", "error of impacts and rests as a way (-)", x_log=True)
+    return Found(largest(off), curve)
+
+
+def _off_turns(room: float, r: float) -> float:
+    """Return the largest error of a time, times the speed of the first impact there: a way, that of cos(t) being 1."""
+    record = run(
+        body=FREE,
+        forcing=TURNING,
+        stop=[restitution(0.0, r), restitution(-room, r, side="lower")],
+        record={"recorded_periods": TURNS // 2},
+    )
+    assert record.impacts is not None
+    assert record.sticks is not None
+    crossing, speed = first_impact(-room, 0.0, load=0.0, slope=1.0)
+    expected = bounces(crossing, speed, r)
+    off = []
+    for turn in range(TURNS):
+        release = QUARTER + math.pi * turn
+        first = record.impacts[record.impacts[:, IMPACT_TIME] > release][:COMPARED]
+        if len(first) < COMPARED or len(record.sticks) != TURNS + 1:
+            return math.inf
+        off.append(first[:, IMPACT_TIME] - release - expected.phases[:COMPARED])
+        off.append(record.sticks[turn + 1, STICK_START] - release - expected.rest)
+    return largest(np.abs(np.concatenate(off, axis=None))) * speed
+
+
+FOURTH_ORDER_OFFSETS = np.array([-1e-3, -1e-6, -1e-12, 0.0, 1e-12, 1e-6, 1e-3])
+"""Relative distance of the amplitude from the force that presses the body to its stop."""
+FREQUENCIES = (0.3, 0.7, 1.4)
+
+
+def _fourth_order() -> Found:
+    """The force of a stop is 0 together with its slope: the body leaves by the fourth power of time, or stays."""
+    errors = []
+    for amplitude in 1.0 + FOURTH_ORDER_OFFSETS:
+        errors += [_off_return(float(amplitude), w, ratio) for w in FREQUENCIES for ratio in (0.0, 0.1)]
+        errors += [_off_touch(float(amplitude), w) for w in FREQUENCIES]
+    off = np.array(errors).reshape(len(FOURTH_ORDER_OFFSETS), -1).max(axis=1)
+    words = "amplitude beside that of fourth order (-)"
+    return Found(largest(off), Curve(FOURTH_ORDER_OFFSETS, off, words, "relative error (-)"))
+
+
+def _off_return(amplitude: float, w: float, ratio: float) -> float:
+    """Return the error of the next impact of a body that is at its stop, at 1, as the force is largest."""
+    held = math.atan2(math.sqrt(max(0.0, (amplitude - 1.0) * (amplitude + 1.0))), 1.0) / w
+    steady = amplitude / complex(1.0 - w**2, 2.0 * ratio * w)
+    turned = steady * cmath.exp(1j * w * held)
+    away, speed, swing = 1.0 - turned.real, w * turned.imag, math.sqrt(1.0 - ratio**2)
+
+    def motion(t: Floats) -> tuple[Floats, Floats]:
+        u = t - held
+        decay, c, s = np.exp(-ratio * u), np.cos(swing * u), np.sin(swing * u) / swing
+        driven = steady * np.exp(1j * w * t)
+        place = driven.real + decay * (away * c + (speed + ratio * away) * s)
+        return place, (1j * w * driven).real + decay * (speed * c - (ratio * speed + away) * s)
+
+    off_the_stop = held + 0.3 / w
+    expected = off_the_stop + first_root(lambda u: motion(off_the_stop + u)[0] - 1.0, 9.0 / w)
+    record = run(
+        body=PLAIN | {"damping_ratio": ratio, "displacement_start": 1.0},
+        forcing={"amplitude": amplitude, "angular_frequency": w},
+        stop=[restitution(1.0, 0.5)],
+        record={"recorded_periods": 2},
+    )
+    assert record.impacts is not None
+    impact = [expected, float(motion(np.array(expected))[1])]
+    return largest(relative(record.impacts[:1, [IMPACT_TIME, IMPACT_VELOCITY]], np.array(impact)))
+
+
+def _off_touch(amplitude: float, w: float) -> float:
+    """Return how far a body is from its stop, at -1, whose force 1 + amplitude cos(w t) only touches 0 each period."""
+    periods = 5
+    record = run(
+        body=PLAIN | {"displacement_start": -1.0},
+        forcing={"amplitude": amplitude, "angular_frequency": w},
+        stop=[restitution(-1.0, 0.5)],
+        record={"recorded_periods": periods},
+    )
+    assert record.sticks is not None
+    rests = periods + 1 if amplitude > 1.0 else 1
+    if len(record.sticks) != rests:
+        return math.inf
+    return largest(np.abs([record.final_displacement + 1.0, record.final_velocity]))
+
+
 CASES = (
     HardCase(
         "chatter",
@@ -167,5 +333,35 @@ CASES = (
         "relative error of the time",
         1e-14,
         _stiff_rest,
+    ),
+    HardCase(
+        "end-at-release",
+        THEME,
+        "bounces that end as their load turns round; starts 1e-12 to 1e-2 beside that",
+        "come to rest before the release, or leave; the motion after it",
+        "flights in closed form, followed back from the release",
+        "relative error of impacts, rest, release and end",
+        7e-13,
+        _end_at_release,
+    ),
+    HardCase(
+        "pressed-in-turn",
+        THEME,
+        "a load that presses a mass to two stops in turn, 1e-3 to 1e-12 apart",
+        "crosses the room at each turn, and bounces to rest",
+        "flights in closed form",
+        "error of times as a way, over the way of the load",
+        5e-14,
+        _pressed_in_turn,
+    ),
+    HardCase(
+        "fourth-order",
+        THEME,
+        "a stop whose force is 0 together with its slope, or 1e-12 to 1e-3 beside that",
+        "the body leaves by the fourth power of time; or it stays, where the force only touches 0",
+        "closed form; statics",
+        "relative error of the next impact, or of the place of rest",
+        9e-14,
+        _fourth_order,
     ),
 )
