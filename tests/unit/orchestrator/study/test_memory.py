@@ -15,6 +15,8 @@ from vibroimpact.orchestrator.study.ways import ways_of
 pytestmark = pytest.mark.skipif(not IS_MEASURED, reason="this system does not tell it")
 
 MEGABYTE = 10**6
+OWN_PAGES = 5 * MEGABYTE
+"""Pages of Python's own code that come back into any fork: .5 MB of Python 3.11, 2.4 to 3.4 MB of 3.13."""
 SAMPLED: dict[str, Any] = {
     "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
     "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
@@ -24,11 +26,11 @@ SAMPLED: dict[str, Any] = {
 
 
 def test_memory_of_c_counts_though_it_is_free_again() -> None:
-    # as the ways of a study, in forks of a process that has nothing else: one of pytest may lose pages meanwhile
+    # as the ways of a study, in forks of a process that has nothing else
     *of_c, nothing = call_alone(memories_of_c, [50 * MEGABYTE, 50 * MEGABYTE, 0])
     for found in of_c:  # and no fork finds what another has left
-        assert 49.5 * MEGABYTE <= found <= 53 * MEGABYTE
-    assert nothing < 3 * MEGABYTE
+        assert 49.5 * MEGABYTE <= found <= 50 * MEGABYTE + OWN_PAGES
+    assert nothing < OWN_PAGES
 
 
 def test_a_way_that_keeps_more_samples_takes_more_memory() -> None:
