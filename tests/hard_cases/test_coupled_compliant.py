@@ -28,6 +28,8 @@ from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
+from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.scene import parse_scene
 
 SAME_VERSIONS = [(v, v) for v in VERSIONS]
 
@@ -85,6 +87,29 @@ def test_a_mass_put_on_the_surface_at_rest_is_held_where_the_force_is(
     assert displacement - 1.0 == pytest.approx(depth, rel=1e-9)
     assert force == pytest.approx(3.0, rel=1e-9)
     run.importer.free()
+
+
+@pytest.mark.parametrize("law", ["hertz", "hunt_crossley"])
+def test_a_stop_at_zero_is_met_within_a_rounding_of_the_flight(law: str) -> None:
+    # it is met at -1e-34 m, which is no rounding of its position: the step after would be made without its force
+    scene = (
+        "[body]\nmass = 0.2\nstiffness = 0.5\ndamping = 0.05\ndisplacement_start = -0.02\nvelocity_start = -0.5\n"
+        f'[[stop]]\nlaw = "{law}"\nposition = 0.0\nstiffness = 17722.0\n'
+        '[[stop]]\nlaw = "hertz"\nposition = -0.05\nside = "lower"\nstiffness = 3366.0\n'
+        "[record]\nrecorded_time = 1.05\n"
+    )
+    fused = final_velocity(scene)
+    for macro_step in (0.05626365760272898, 0.0816438, 0.021082):
+        coupled_there = final_velocity(f'{scene}[execution]\nhow = "coupled"\nmacro_step = {macro_step!r}\n')
+        assert coupled_there == pytest.approx(fused, abs=1e-5)
+
+
+def final_velocity(text: str) -> float:
+    runner = named_runner(parse_scene(text, "scene.toml"), "vibroimpact.orchestrator.run:PointRunner")
+    try:
+        return runner.run({}).final_velocity
+    finally:
+        runner.close()
 
 
 def test_a_mass_on_the_surface_that_is_drawn_away_leaves_at_once() -> None:

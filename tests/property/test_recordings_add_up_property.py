@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from support.cut_recordings import counts_differ, problem_of_cuts
 
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.orchestrator.campaign.chunks import (
@@ -24,21 +25,10 @@ from vibroimpact.orchestrator.campaign.chunks import (
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.many_points.loop import loop_of
-from vibroimpact.orchestrator.run.parameters import float_parameters
-from vibroimpact.orchestrator.run.point import driver_of
-from vibroimpact.orchestrator.run.record import RecordedBody
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 Floats = NDArray[np.float64]
-
-AGREEMENT = {"fused": 1e-6, "coupled": 1e-3}
-"""Difference of the times of one event in two runs, relative to the run: rounding, multiplied by some impacts; a cut
-makes other steps of the contact with another FMU's stop."""
-ROOM = 1e-12
-"""Time after its end at which an event of a coupled run counts as at the end, s: `body/landing.c`."""
-MOST_EVENTS = 40
-"""Events of a run beyond which chaos may have multiplied rounding by anything."""
 
 OSCILLATOR = """[body]
 mass = 1.0
@@ -114,67 +104,16 @@ def scenes(draw: st.DrawFn) -> Scene:
     return parse_scene(f"{text}[record]\n{window}\n", "scene.toml")
 
 
-def recorded(driver: RecordedBody, scene: Scene, begin: float, end: float) -> tuple[Floats, Floats]:
-    """Return the impacts and the sticks that a recording has."""
-    driver.begin(float_parameters(scene, None), None)
-    driver.advance(begin)
-    driver.record(impacts=True, extrema=False, periods=False)
-    driver.advance(end)
-    return driver.impacts(), driver.sticks()
-
-
-def cuts_of(impacts: Floats, sticks: Floats, end: float, share: float) -> list[float]:
-    """Return where to cut a run: at a share of it, and at, in and after one of its contacts and one of its rests."""
-    cuts = [share * end]
-    if len(impacts):
-        row = impacts[int(share * len(impacts))]
-        duration = row[6] if row[6] > 0.0 else 1e-3
-        cuts += [row[0], row[0] + 0.5 * duration, row[0] + duration]
-    if len(sticks):
-        row = sticks[int(share * len(sticks))]
-        last = row[1] if np.isfinite(row[1]) else end
-        cuts += [row[0], 0.5 * (row[0] + last), last]
-    return [cut for cut in cuts if 0.0 < cut < end]
-
-
-def check_that_recordings_add_up(scene: Scene, how: str, share: float, *, end: float = 12.0) -> int:
-    """Cut a run where `cuts_of` says, compare, and return how many contacts were open at a cut."""
-    driver = driver_of(scene, how)
-    driver.watch(contacts=len(scene.stops))
-    were_open = 0
-    try:
-        whole = recorded(driver, scene, 0.0, end)
-        times = np.sort(np.concatenate([rows[:, 0] for rows in whole]))[:MOST_EVENTS]
-        if (
-            len(times) == MOST_EVENTS
-        ):  # between two of them: rounding may move one that is at the end beyond it
-            longest = int(np.diff(times).argmax())
-            end = float(times[longest : longest + 2].mean())
-            whole = recorded(driver, scene, 0.0, end)
-        for cut in cuts_of(*whole, end, share):
-            parts = recorded(driver, scene, 0.0, cut), recorded(driver, scene, cut, end)
-            for kind, number in ((0, 4), (1, 2)):
-                first, second, all_rows = parts[0][kind], parts[1][kind], whole[kind]
-                assert (first[:, 0] <= cut + ROOM).all()
-                assert (second[:, 0] >= cut).all()
-                both = np.concatenate([first, second])[:, [0, number]]
-                assert both == pytest.approx(all_rows[:, [0, number]], abs=AGREEMENT[how] * end)
-            were_open += int(np.isnan(parts[0][0][:, 6]).sum())
-    finally:
-        driver.close()
-    return were_open
-
-
 @settings(max_examples=120)
 @given(scene=scenes(), share=st.floats(0.0, 0.999))
 def test_recordings_of_a_fused_body_add_up(scene: Scene, share: float) -> None:
-    check_that_recordings_add_up(scene, "fused", share)
+    assert problem_of_cuts(scene, "fused", share, 12.0) is None
 
 
 @settings(max_examples=8)
 @given(scene=scenes(), share=st.floats(0.0, 0.999))
 def test_recordings_of_a_coupled_body_add_up(scene: Scene, share: float) -> None:
-    check_that_recordings_add_up(scene, "coupled", share, end=5.0)
+    assert problem_of_cuts(scene, "coupled", share, 5.0) is None
 
 
 LANES = """[body]
@@ -221,8 +160,7 @@ def test_recordings_of_points_in_lanes_and_in_the_loop_add_up(
 
     whole = impacts(0.0, 8.0)
     assert min(whole) > 3
-    first, second = impacts(0.0, cut), impacts(cut, 8.0)
-    assert [one + other for one, other in zip(first, second, strict=True)] == whole
+    assert counts_differ([impacts(0.0, cut), impacts(cut, 8.0)], whole) is None
 
 
 PAIR = """[component.table]

@@ -27,7 +27,8 @@ from vibroimpact.orchestrator.importer.wiring import Transfer
 #: What a body's contact port must have, beside the inputs.
 PORT_OUTPUTS = ("displacement", "velocity")
 FORCE, STIFFNESS, DAMPING = "applied_force", "applied_stiffness", "applied_damping"
-#: A body on the surface is there within this times its displacement and the stop's position.
+#: A body on the surface is there within this times the sizes that its displacement is the sum of: the stop's position,
+#: the largest displacement before, and the way in the time of the run.
 SURFACE_ROUNDING = 1e-15
 #: A step longer than its limit by more than this factor, as its end shows, is repeated.
 SLACK = 1.5
@@ -139,6 +140,7 @@ class ContactBond:
         self._depth: float | None = None
         self._limit = self._longest = math.inf
         self._largest_force = 0.0
+        self._largest_displacement = 0.0
         self._pace = 1.0
 
     @staticmethod
@@ -172,7 +174,7 @@ class ContactBond:
         if not self.follows:
             return target
         start = self.look()
-        was_active, self.active = self.active, self._is_closed(start)
+        was_active, self.active = self.active, self._is_closed(start, time)
         if not self.active:
             self._longest = math.inf
             return target
@@ -193,10 +195,14 @@ class ContactBond:
             self._longest = longest
         return min(target, time + self._longest)
 
-    def _is_closed(self, now: _Answer) -> bool:
+    def _is_closed(self, now: _Answer, time: float) -> bool:
         """Pressed in, or on the surface and perhaps about to be."""
         size = abs(now.penetration) + 2.0 * abs(self._position)
-        on_surface = abs(now.penetration) <= SURFACE_ROUNDING * size
+        self._largest_displacement = max(self._largest_displacement, size)
+        # a stop at 0 is met within a rounding of the flight before, not of its position
+        on_surface = abs(now.penetration) <= SURFACE_ROUNDING * (
+            self._largest_displacement + abs(time * now.rate)
+        )
         return now.force > 0.0 or (now.rate >= 0.0 if on_surface else now.penetration > 0.0)
 
     def _time_scale(self, stiffness: float) -> float:

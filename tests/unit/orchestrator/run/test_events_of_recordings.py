@@ -105,6 +105,58 @@ def test_what_happens_where_the_motion_begins_belongs_to_its_recording(law: str,
     assert record.impacts[0, [0, 2]].tolist() == pytest.approx([0.0, 1.0], abs=1e-12)
 
 
+def test_a_contact_that_begins_at_rest_is_open_before_its_impulse_outgrows_rounding() -> None:
+    # pressed from the surface on by a constant force: after .5 ms the impulse is 1e-18 of what it will be
+    text = (
+        "[body]\nmass = 1.0\nstiffness = 0.0\ndamping = 0.3\ndisplacement_start = 0.3\n"
+        "[forcing]\namplitude = 0.3\nangular_frequency = 0.0\n"
+        '[[stop]]\nlaw = "hunt_crossley"\nposition = 0.3\nstiffness = 240.0\nexponent = 2.2\n'
+        "[record]\ntransient_time = {begin}\nrecorded_time = {length}\n"
+    )
+    whole, first, second = (
+        run_of(text.format(begin=begin, length=length)).impacts
+        for begin, length in ((0.0, 2.0), (0.0, 5e-4), (5e-4, 2.0))
+    )
+    assert whole is not None
+    assert first is not None
+    assert second is not None
+    assert (len(whole), len(first), len(second)) == (1, 1, 0)
+    assert first[0, [0, 2]].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("how", ["fused", "coupled"])
+def test_a_body_that_turns_inside_its_stop_begins_another_contact(how: str) -> None:
+    # the dashpot would pull on the way out: the force ends inside the stop, and comes back before the body is out
+    text = (
+        '[body]\nkind = "beam"\nlength = 1.0\nmass_per_length = 1.0\nflexural_rigidity = 1.0\nmodes = 5\n'
+        "velocity_start = [1.0]\n[forcing]\namplitude = 3.0\nphase = 1.0\nangular_frequency = 0.0\n"
+        '[[stop]]\nlaw = "kelvin_voigt"\nposition = 0.03\nlocation = 0.8\nstiffness = 18.68\ndamping = 30.0\n'
+        "[record]\nrecorded_time = 1.0\n"
+    )
+    if how == "coupled":
+        text += '[execution]\nhow = "coupled"\nmacro_step = 0.01\n'
+    impacts = run_of(text, how=how).impacts
+    assert impacts is not None
+    assert impacts[:4, 0] == pytest.approx([0.0207, 0.1621, 0.2614, 0.3605], abs=0.01)
+    ended = impacts[:-1]
+    assert (ended[:, 0] + ended[:, 6] <= impacts[1:, 0]).all()
+
+
+@pytest.mark.parametrize("how", ["fused", "coupled"])
+def test_a_start_that_leaves_its_stop_without_force_is_no_contact_yet(how: str) -> None:
+    text = (
+        "[body]\nmass = 0.2\nstiffness = 0.0\ndisplacement_start = 0.1\nvelocity_start = -0.5\n"
+        "[forcing]\namplitude = 1.0\nangular_frequency = 0.0\n"
+        '[[stop]]\nlaw = "kelvin_voigt"\nposition = 0.0\nstiffness = 12.6\ndamping = 30.0\n'
+        "[record]\nrecorded_time = 1.0\n"
+    )
+    if how == "coupled":
+        text += '[execution]\nhow = "coupled"\nmacro_step = 0.001\n'
+    impacts = run_of(text, how=how).impacts
+    assert impacts is not None
+    assert impacts[:, 0] == pytest.approx([0.0924], abs=2e-3)
+
+
 def test_a_rest_that_lasts_since_before_the_recording_is_no_event_of_it() -> None:
     text = RESTS.format(stiffness=1.0, position=-0.3)
     first = run_of(text)

@@ -115,13 +115,14 @@ static bool only_touched(const vi_structure *s, int k)
     return true;
 }
 
-/* Is a contact, as far as it has come, a touch of rounding size, with neither speed nor impulse? It is no impact. An impulse is known only where
- * the force is integrated in here. */
+/* Is a contact, as far as it has come, a touch of rounding size? It began without speed, has no impulse and does not
+ * go in now: it is no impact. An impulse is known only where the force is integrated in here. */
 static bool is_rounding(const vi_structure *s, int k)
 {
     const vi_touch_down *touch = &s->state->touch_down[k];
     const double noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
-    return !s->state->exchange.on && touch->velocity == 0.0 && touch->impulse * s->model->mobility[k][k] <= noise;
+    return !s->state->exchange.on && touch->velocity == 0.0 && touch->impulse * s->model->mobility[k][k] <= noise &&
+           vi_structure_approach(s, k) <= noise;
 }
 
 void vi_structure_separate(const vi_structure *s, int k, bool receding)
