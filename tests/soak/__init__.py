@@ -1,6 +1,6 @@
 """What is long: thousands of random cases of each kind, run by `make soak`.
 
-`make test` takes a sample of each kind that needs no rig and no service.
+`make test` takes a sample of each kind but the dear ones (`test_sample.py`).
 
 A kind is a module of this folder whose name does not begin with `_` or `test_`:
 

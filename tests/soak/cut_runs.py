@@ -171,7 +171,7 @@ def stop_law(draw: random.Random, *, relaxes: bool = True) -> Tables:
     law = draw.choice(("restitution", "restitution", "kelvin_voigt", "hertz", "hunt_crossley"))
     if law == "restitution":
         yields = {"yield_velocity": draw.choice((0.05, 0.5))} if relaxes and draw.random() < 0.2 else {}
-        return {"law": law, "restitution": draw.choice((0.0, 0.1, 0.3, 0.7, 0.95, 1.0))} | yields
+        return {"law": law, "restitution": draw.choice((0.0, 0.15, 0.3, 0.7, 0.95, 1.0))} | yields
     stop: Tables = {"law": law, "stiffness": 10.0 ** draw.uniform(0.7, 5.0)}
     if law == "kelvin_voigt":
         # an importer finds the end of a strong dashpot's force no better than its steps
@@ -219,18 +219,19 @@ def _many_points(draw: random.Random) -> str | None:
     else:
         edges = [0.0, draw.uniform(0.05, 5.0), 6.0]
     try:
-        counts = [_counts(tables, is_forced, *window) for window in [*pairwise(edges), (edges[0], edges[-1])]]
+        windows = [*pairwise(edges), (edges[0], edges[-1])]
+        counts = [_counts(tables, is_forced, *window) for window in windows]
     except VibroimpactError as error:
         return f"{json.dumps(tables)}: {error}"
     # chaos multiplies rounding by anything; lanes are followed in other steps from another beginning
-    few = [k for k, count in enumerate(counts[-1]) if count < MOST_EVENTS]
-    *parts, whole = [[count[k] for k in few] for count in counts]
+    few = [k for k, own in enumerate(zip(*counts, strict=True)) if None not in own and own[-1] < MOST_EVENTS]
+    *parts, whole = [[count[k] or 0 for k in few] for count in counts]
     problem = counts_differ(parts, whole)
     return None if problem is None else f"{json.dumps(tables)}: at {edges}, of {few}: {problem}"
 
 
-def _counts(tables: Tables, is_forced: bool, begin: float, end: float) -> list[int]:
-    """Return the impacts and rests of each point in a recording."""
+def _counts(tables: Tables, is_forced: bool, begin: float, end: float) -> list[int | None]:
+    """Return the impacts and rests of each point in a recording; None where a graze is one of them."""
     unit = "periods" if is_forced else "time"
     window = {f"transient_{unit}": begin, f"recorded_{unit}": end - begin}
     scene = Scene.from_dict(tables | {"record": window})
@@ -243,7 +244,10 @@ def _counts(tables: Tables, is_forced: bool, begin: float, end: float) -> list[i
     columns = ran if isinstance(ran, RunColumns) else columns_of(ran)
     assert columns.impacts is not None
     assert columns.sticks is not None
-    return [int(a + b) for a, b in zip(columns.impacts.count, columns.sticks.count, strict=True)]
+    impacts, counts = columns.impacts, columns.impacts.count + columns.sticks.count
+    runs = np.repeat(np.arange(len(counts)), impacts.count)
+    faint = set(runs[impacts.rows[:, 2] < FAINT].tolist())
+    return [None if run in faint else int(count) for run, count in enumerate(counts)]
 
 
 # ---- bodies that hit each other, and bodies of other tools ----

@@ -11,13 +11,11 @@ from soak._kinds import kind, names
 from soak._runner import run
 
 BASE_SEED = 11
-# of seconds of processor time a case; tests/unit has shorter tests of both
-RIGS_AND_SERVICES = {"drives", "rig_recordings", "service_kills", "service_requests"}
+# of seconds of processor time a case; tests/unit has shorter tests of each
+DEAR = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests"}
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.long] * (n in RIGS_AND_SERVICES)) for n in names()]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] * (n in DEAR)) for n in names()])
 def test_a_sample_of_each_kind_finds_no_problem(name: str, tmp_path: Path) -> None:
     one, journal = kind(name), Journal(tmp_path / "journal.jsonl")
     try:
