@@ -6,6 +6,7 @@
 
 #include "body/modal/modal_scan.h"
 #include "body/modal/structure.h"
+#include "body/modal/structure_contact.h"
 
 /* A body of one mode, mass-normalised, with at most one stop. */
 typedef struct {
@@ -80,6 +81,7 @@ VI_DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, con
     const double load[VI_MODES] = {b.root * held}, rate[VI_MODES] = {b.root * held_rate};
     const vi_structure s = parts_of(&b);
     vi_structure_hold(&s, load, rate);
+    vi_structure_meet_forces(&s);
     if (!advance(&b, 0.0, duration, true)) {
         return 1;
     }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "body/law_check.h"
+#include "body/modal/structure_contact.h"
 #include "body/modal/structure_impact.h"
 
 /* An importer's communication point may differ from the body's own time by this times (1 + |time|), s. */
@@ -257,6 +258,7 @@ void vi_structure_component_hold(vi_structure_component *c, const double held[VI
 {
     const vi_structure parts = parts_of(c);
     vi_structure_hold(&parts, held, held_rate);
+    vi_structure_meet_forces(&parts);
     c->inputs_changed = 0;
 }
 

@@ -162,6 +162,26 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     }
 }
 
+static void meet_force(const vi_structure *s, int k)
+{
+    const bool is_pressed = s->contacts[k].applied_force > 0.0;
+    if (s->state->status[k] == VI_CONTACT_RECEDING && is_pressed) {
+        vi_structure_touch_down(s, k);
+    } else if (s->state->status[k] == VI_CONTACT_YIELDING && !is_pressed && !s->state->moved
+               && vi_structure_approach(s, k) < 0.0) {
+        vi_structure_separate(s, k, true);
+    }
+}
+
+void vi_structure_meet_forces(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->model->stop[k] == VI_YIELDING_STOP && vi_contact_law_is_external(s->contacts[k].law.law)) {
+            meet_force(s, k);
+        }
+    }
+}
+
 bool vi_structure_surface_lags(const vi_structure *s, int k)
 {
     return s->contacts[k].relaxation_time > 0.0 && s->state->surface[k] > 0.0;

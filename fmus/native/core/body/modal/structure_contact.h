@@ -28,6 +28,10 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding);
  * that follows it without force. */
 void vi_structure_return(const vi_structure *s, int k);
 
+/* A step begins: a contact begins where the force of another FMU's stop does, and not with a start that leaves the stop
+ * without force. */
+void vi_structure_meet_forces(const vi_structure *s);
+
 /* Does the surface of a receding compliant stop still lag behind, on its way back to rest? */
 bool vi_structure_surface_lags(const vi_structure *s, int k);
 

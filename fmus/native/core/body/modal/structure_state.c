@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "body/landing.h"
-#include "body/modal/structure_contact.h"
 
 /* ---- the model ---- */
 
@@ -223,18 +222,6 @@ void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH
 
 /* ---- inputs ---- */
 
-/* A contact begins where the force of another FMU's stop does, and not with a start that leaves the stop without force. */
-static void meet_force(const vi_structure *s, int k)
-{
-    const bool is_pressed = s->contacts[k].applied_force > 0.0;
-    if (s->state->status[k] == VI_CONTACT_RECEDING && is_pressed) {
-        vi_structure_touch_down(s, k);
-    } else if (s->state->status[k] == VI_CONTACT_YIELDING && !is_pressed && !s->state->moved
-               && vi_structure_approach(s, k) < 0.0) {
-        vi_structure_separate(s, k, true);
-    }
-}
-
 void vi_structure_hold(const vi_structure *s, const double held[], const double held_rate[])
 {
     vi_structure_state *state = s->state;
@@ -250,7 +237,6 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
         if (s->model->stop[k] == VI_YIELDING_STOP && vi_contact_law_is_external(contact->law.law)) {
             state->reference_penetration[k] = -vi_structure_clearance(s, k);
             state->reference_rate[k] = vi_structure_approach(s, k);
-            meet_force(s, k);
             continue;
         }
         const double push = vi_structure_direction(s, k) * contact->applied_force;
