@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.events import StepWatcher
 
@@ -169,7 +170,7 @@ class RecordedBody(ABC):
         self._group_of = group
         self._observed = group("Float64", OBSERVED, None)
         self._switches = group("Boolean", ("record.impacts", "record.extrema", "record.periods"), None)
-        self._count = group("Int64", ("record.count",), None)
+        self._counts = group("Int64", ("record.count", "record.dropped"), None)
         self._taken = group("Int64", ("record.taken",), None)
         self._rows = group("Float64", ("record.rows",), ROW_CAPACITY * ROW_WIDTH)
         self._table = self._rows.values.reshape(ROW_CAPACITY, ROW_WIDTH)
@@ -257,8 +258,16 @@ class RecordedBody(ABC):
             self._energies.set()
 
     def take_rows(self) -> None:
-        """Take the rows that the body has recorded since the last time."""
-        count = int(self._count.get()[0])
+        """Take the rows that the body has recorded since the last time.
+
+        Raises
+        ------
+        ComponentError
+            Rows are lost: whoever drives the body has not emptied its record in time.
+        """
+        count, lost = self._counts.get().tolist()
+        if lost:
+            raise ComponentError(f"body: expected all rows of its record, {lost} are lost.", instance="body")
         if count:
             self._rows.get()
             self.rows.blocks.append(self._table[:count].copy())

@@ -44,6 +44,22 @@ static void rows_taken_leave_the_others_in_order(void)
     }
 }
 
+static void a_full_record_ends_a_step_once_until_it_is_emptied(void)
+{
+    memset(&record, 0, sizeof record);
+    record.impacts = 1;
+    fill(VI_RECORD_CAPACITY - VI_RECORD_RESERVE);
+    CHECK(!vi_record_ends_step(&record), "%s", "room for one event");
+    fill(1);
+    for (int n = 0; n < 2; ++n) {
+        CHECK(vi_record_ends_step(&record), "fill %d", n);
+        CHECK(!vi_record_ends_step(&record), "again, fill %d", n);
+        record.taken = record.count;
+        vi_record_take(&record);
+        fill(VI_RECORD_CAPACITY);
+    }
+}
+
 static void any_order_of_calls_keeps_it_in_its_bounds(void)
 {
     uint64_t seed = 3;
@@ -73,6 +89,7 @@ int main(void)
 {
     a_full_record_drops_and_counts();
     rows_taken_leave_the_others_in_order();
+    a_full_record_ends_a_step_once_until_it_is_emptied();
     any_order_of_calls_keeps_it_in_its_bounds();
     return 0;
 }

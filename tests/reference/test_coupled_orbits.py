@@ -163,6 +163,19 @@ def test_a_thousand_impacts_are_the_same_with_communication_points_between_them(
     assert_same_motion(fused, coupled)
 
 
+@pytest.mark.parametrize("transient", [1000, 1001, 1002])
+def test_no_row_is_lost_wherever_an_impact_fills_the_record(transient: int) -> None:
+    """Rows of impacts are written between steps, those of periods in them: either may be the last there is room for."""
+    scene = example("bifurcation.toml", 900)
+    scene = scene.model_copy(
+        update={"record": scene.record.model_copy(update={"transient_periods": transient})}
+    )
+    record = run(scene, "coupled", {"forcing.angular_frequency": 0.85})  # an impact in every second period
+    assert record.periods is not None
+    assert len(record.periods) == 900
+    assert len(impacts_of(record)) == record.periods[:, 4].sum() == 450
+
+
 def test_a_record_of_more_periods_than_the_body_keeps_loses_none_without_impacts() -> None:
     scene = example("bifurcation.toml", 2000)
     records = [run(scene, how, {"forcing.angular_frequency": 1.6}) for how in ("fused", "coupled")]
@@ -259,7 +272,9 @@ def test_in_chaos_the_first_ten_impacts_agree_and_then_the_statistics() -> None:
     text = f'{CHAOS}[execution]\nhow = "coupled"\nmacro_step = 1.9\n'
     coupled = run(parse_scene(text, "chaos.toml"), "coupled", {})
     a, b = impacts_of(fused), impacts_of(coupled)
-    assert np.abs(a[:10] - b[:10]).max() <= 1e-10
+    assert a[:10] == pytest.approx(
+        b[:10], rel=0.0, abs=1e-10, nan_ok=True
+    )  # a rigid stop has no largest force
     shorter = min(len(a), len(b))
     assert np.abs(a[:shorter, SPEED] - b[:shorter, SPEED]).max() > 0.1  # it is chaos
     assert abs(len(a) / len(b) - 1.0) <= 0.02

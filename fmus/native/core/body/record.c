@@ -10,6 +10,7 @@ void vi_record_take(vi_record *record)
         memmove(record->rows, record->rows + (record->count - left) * VI_RECORD_WIDTH,
                 (size_t)left * VI_RECORD_WIDTH * sizeof(double));
         record->count = left;
+        record->told = 0;
     }
     record->taken = 0;
 }
@@ -36,6 +37,13 @@ void vi_record_switched(vi_record *record)
 bool vi_record_full(const vi_record *record)
 {
     return record->count > VI_RECORD_CAPACITY - VI_RECORD_RESERVE;
+}
+
+bool vi_record_ends_step(vi_record *record)
+{
+    const bool ends = vi_record_full(record) && !record->told;
+    record->told |= ends;
+    return ends;
 }
 
 static void append(vi_record *record, const double row[VI_RECORD_WIDTH])

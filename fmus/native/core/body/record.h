@@ -24,6 +24,7 @@ typedef struct {
     /* outputs */
     double displacement_max, displacement_min; /* m */
     int64_t count, dropped;
+    int64_t told; /* the importer has been told that it is full, and has not emptied it since */
     /* the period now open */
     int32_t open;       /* extremes are being followed */
     int32_t period_open;
@@ -44,6 +45,9 @@ void vi_record_switched(vi_record *record);
 
 /* Is there too little room for what one event may write? */
 bool vi_record_full(const vi_record *record);
+
+/* Does a step end here, as the record is full? Once: what the importer does not empty would end its steps for ever. */
+bool vi_record_ends_step(vi_record *record);
 
 void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                       double restitution);

@@ -377,12 +377,11 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     begin_step(s);
-    /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
-    const bool ends_when_full = request->early_return && !vi_record_full(s->record);
     vi_step_result result = VI_STEP_DONE;
     while (result == VI_STEP_DONE && !s->state->pending
            && vi_clock_is_before(s->state->now, target)) {
-        result = ends_when_full && vi_record_full(s->record) ? VI_STEP_RECORD_FULL : move_on(s, target, request);
+        const bool is_full = request->early_return && vi_record_ends_step(s->record);
+        result = is_full ? VI_STEP_RECORD_FULL : move_on(s, target, request);
     }
     return vi_budget_end(&s->state->budget, result == VI_STEP_DONE && s->state->pending ? VI_STEP_CONTACT : result);
 }
