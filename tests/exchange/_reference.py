@@ -119,12 +119,14 @@ def _result(path: Path) -> Table:
 
 def _run(path: Path, names: list[str], time: Rows, folder: Path) -> tuple[Rows, Rows]:
     """Return time and variables of our run of the experiment whose result has this time, and the instants of events."""
-    step = float(np.median(np.diff(time)))
+    # differences of times that were written with all their digits are rounded in the last ones
+    end = float(time[-1])
+    step = end / round(end / float(np.median(np.diff(time))))
     scene = Scene.from_dict(
         {
             "component": {"x": {"fmu": str(path)}},
             "record": {
-                "recorded_time": float(time[-1]),
+                "recorded_time": end,
                 "variables": [f"x.{name}" for name in names],
                 "rate": 1.0 / step,
             },

@@ -77,18 +77,24 @@ def _is_multiple(time: float, step: float) -> bool:
     return abs(ratio - round(ratio)) <= WHOLE * ratio and (time == 0.0 or round(ratio) >= 1)
 
 
+def _in_digits(value: float) -> str:
+    """Return a number in six digits, or in all that it has, so that one off by a rounding shows it."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
+
+
 def _macro_step_problems(draft: GeneralDraft, grid: _Grid, macro_step: float) -> Iterator[Problem]:
     assert draft.record is not None
     if not _is_multiple(macro_step, grid.step):
         expected = f"a multiple of {grid.step:g} s, the step of {grid.owner}"
-        yield Problem(STEP_KEY, expected, f"{macro_step:g}")
+        yield Problem(STEP_KEY, expected, _in_digits(macro_step))
     if grid.facts.capabilities.variable_steps:
         return
     for key in ("transient_time", "recorded_time"):
         value = getattr(draft.record, key)
         if not _is_multiple(value, macro_step):
             expected = f"a multiple of macro_step = {macro_step:g} s, the only step of {grid.owner}"
-            yield Problem(key_path(("record", key)), expected, f"{value:g}", _step_hint(draft))
+            yield Problem(key_path(("record", key)), expected, _in_digits(value), _step_hint(draft))
 
 
 def _step_hint(draft: GeneralDraft) -> str:
@@ -108,7 +114,8 @@ def _rate_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:
     if not _is_multiple(1.0 / record.rate, grid.step) or not _is_multiple(record.transient_time, grid.step):
         expected = f"samples at multiples of {grid.step:g} s, the step of {grid.owner}"
         hint = _step_hint(draft) or f"Use a rate of {1.0 / grid.step:g}, or that over a whole number."
-        yield Problem("record.rate", expected, f"{record.rate:g} from {record.transient_time:g} s on", hint)
+        got = f"{_in_digits(record.rate)} from {_in_digits(record.transient_time)} s on"
+        yield Problem("record.rate", expected, got, hint)
 
 
 def _clock_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:

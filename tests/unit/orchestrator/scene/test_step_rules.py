@@ -129,6 +129,17 @@ def test_what_cuts_a_step_is_refused_by_the_attribute(
     assert line in refusal(folder, **options)
 
 
+def test_a_step_that_is_off_by_a_rounding_is_told_with_the_digits_that_differ(folder: Path) -> None:
+    # such as a difference of two times: 19.99 s to 20 s
+    almost = "0.00099999999999997877"
+    grid = refusal(folder, fmu="Grid.fmu", execution=f"macro_step = {almost}")
+    only = refusal(folder, record="recorded_time = 0.3000000000001", variables="")
+    rate = refusal(folder, record="recorded_time = 0.3\nrate = 1000.0000001")
+    assert f"a multiple of 0.001 s, the step of {OF_3}, got 0.0009999999999999788" in grid
+    assert f"{ONLY_STEP} {OF_2}, got 0.3000000000001" in only
+    assert "got 1000.0000001 from 0 s on" in rate
+
+
 def test_a_contact_of_others_beside_steps_of_one_size_is_refused_too(folder: Path) -> None:
     # it ends the steps of all
     parts = CONTACT.replace('"m"', '"other"') + '[component.other]\nfmu = "Mass.fmi2.fmu"\n'
