@@ -1,6 +1,7 @@
 """`make exchange`: every export in every tool that is here, into docs/exchange.md; exit code 1 where one differs.
 
 `python -m exchange machines` makes one of its tables: tools, pairs, integrated, systems, reference, machines.
+A tool that is not here has no row; the program says so.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,6 @@ from exchange import _model_exchange, _systems
 from exchange._cases import (
     COUNT,
     NAMES,
-    PAIR_OUTPUTS,
     PAIRS,
     RATE,
     Rows,
@@ -34,6 +34,8 @@ from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupl
 
 PAGE = ROOT / "docs" / "exchange.md"
 GOAL = 1e-9
+NO_COUPLING = "couples none"
+"""The cell of a tool that runs one FMU alone."""
 CONSOLE = Console(width=180)
 CONSOLE.soft_wrap = True
 
@@ -62,11 +64,10 @@ Row = Callable[[Tool, str, list[str]], Iterator[Cell]]
 def _of_tools(table: str, names: list[str], row: Row) -> Iterator[str]:
     """Write the table of tools or of pairs; yield what was not as it should be."""
     lines = ["| tool | FMI | " + " | ".join(names) + " |", "|---" * (2 + len(names)) + "|"]
-    for tool in TOOLS:
+    for tool in _here(TOOLS):
         for versions, cells in _cells(tool, table, row):
-            shown = tool.name if tool.missing() else tool.shown()
-            lines.append(_line(shown, [versions, *cells, *[""] * (len(names) - len(cells))]))
-            tried = [cell for cell in cells if not str(cell).startswith(("not tried", "couples none"))]
+            lines.append(_line(tool.shown(), [versions, *cells, *[""] * (len(names) - len(cells))]))
+            tried = [cell for cell in cells if cell != NO_COUPLING]
             if not all(isinstance(cell, float) and cell <= GOAL for cell in tried):
                 yield f"{tool.name}, FMI {versions}: expected {GOAL:g} at most, got {', '.join(map(str, cells))}."
     _write(table, lines)
@@ -76,11 +77,8 @@ def _of_integrated() -> Iterator[str]:
     """Write the table of model exchange; yield what was not as it should be."""
     names = list(_model_exchange.STEPS)
     lines = ["| tool | FMI | tolerance | " + " | ".join(names) + " |", "|---" * (3 + len(names)) + "|"]
-    for tool in TOOLS:
-        for fmi in _model_exchange.VERSIONS.get(tool.name, ()):
-            if reason := tool.missing():
-                lines.append(_line(tool.name, [fmi, "", f"not tried: {reason}", *[""] * (len(names) - 1)]))
-                continue
+    for tool in _here(tool for tool in TOOLS if tool.name in _model_exchange.VERSIONS):
+        for fmi in _model_exchange.VERSIONS[tool.name]:
             for tolerance in _model_exchange.TOLERANCES:
                 cells = [_cell_of_integrated(tool, fmi, name, tolerance) for name in names]
                 lines.append(_line(tool.shown(), [fmi, f"{tolerance:.0e}", *cells]))
@@ -100,9 +98,9 @@ def _cell_of_integrated(tool: Tool, fmi: str, name: str, tolerance: float) -> Ce
 def _of_systems() -> Iterator[str]:
     """Write the table of systems; yield what was not as it should be."""
     lines = ["| tool | FMI | gains | two oscillators with a spring |", "|---|---|---|---|"]
+    here = [tool.name for tool in _here(tool for tool in TOOLS if tool.name in _systems.GAINS)]
     for tool, fmi, gains in _systems.PAIRS:
-        if reason := tool.missing():
-            lines.append(_line(tool.name, [fmi, gains, f"not tried: {reason}"]))
+        if tool.name not in here:
             continue
         with tempfile.TemporaryDirectory() as folder:
             system, expected = _systems.made(Path(folder), tool, fmi, gains)
@@ -183,16 +181,22 @@ def _write(table: str, lines: list[str]) -> None:
     PAGE.write_text(re.sub(f"{begin}.*{end}", lambda _: written, text, flags=re.S), encoding="utf-8")
 
 
+def _here(tools: Iterable[Tool]) -> Iterator[Tool]:
+    """Yield the tools that are here; say of the others why they are not tried."""
+    for tool in tools:
+        if reason := tool.missing():
+            CONSOLE.print(f"{tool.name} is not tried: {reason}.", markup=False)
+        else:
+            yield tool
+
+
 def _cells(tool: Tool, table: str, row: Row) -> Iterator[tuple[str, list[Cell]]]:
     """Yield the rows of a tool: the version or versions of FMI, and the cells."""
     versions = tool.couples if table == "pairs" else tool.versions
     if not versions:
-        yield ", ".join(tool.versions), ["couples none"]
-    elif reason := tool.missing():
-        yield ", ".join(versions), [f"not tried: {reason}"]
-    else:
-        for fmi in versions:
-            yield fmi, list(row(tool, fmi, list(PAIRS if table == "pairs" else NAMES)))
+        yield ", ".join(tool.versions), [NO_COUPLING]
+    for fmi in versions:
+        yield fmi, list(row(tool, fmi, list(PAIRS if table == "pairs" else NAMES)))
 
 
 def _row_of_tool(tool: Tool, fmi: str, names: list[str]) -> Iterator[Cell]:
@@ -205,11 +209,9 @@ def _row_of_tool(tool: Tool, fmi: str, names: list[str]) -> Iterator[Cell]:
 def _row_of_pair(tool: Tool, fmi: str, names: list[str]) -> Iterator[Cell]:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
-            fmus, expected = made_pair(name, fmi, Path(folder))
-            connections = PAIRS[name].connections
-            yield _cell(
-                run_coupled, expected, tool, fmus, connections, PAIR_OUTPUTS, 1.0 / RATE, COUNT, Path(folder)
-            )
+            it = made_pair(name, tool, fmi, Path(folder))
+            asked = (tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, Path(folder))
+            yield _cell(run_coupled, it.rows, *asked)
 
 
 def _cell(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -329,6 +330,10 @@ class Pair:
     connections: tuple[tuple[str, str], ...]
     units: str = ""
 
+    def mass(self, component: str) -> float:
+        """Return the mass of a component, kg."""
+        return float(self.parameters[component].get("mass", 1.0))
+
 
 UPPER = {"contact[1].law": "restitution", "contact[1].restitution": 0.6}
 LOWER = {
@@ -372,37 +377,79 @@ PAIRS = {
         units="N/m",
     ),
 }
-# accelerations and forces follow inputs at once, so that it depends on a tool whether they are those before an exchange
-STATE_OUTPUTS = ("displacement", "velocity", "energy.kinetic", "energy.potential")
-AT_STOPS = ("displacement", "velocity", "impulse", "total_impulse", "last_velocity")
-PAIR_OUTPUTS = tuple(
-    f"{name}.{output}"
-    for name in "ab"
-    for output in (*STATE_OUTPUTS, *(f"contact[{k}].{at}" for k in (1, 2) for at in AT_STOPS))
-)
 
 
-def made_pair(name: str, fmi: str, folder: Path) -> tuple[dict[str, Path], Rows]:
-    """Return the FMUs of a pair, and what its outputs are after each step of our own importer's Jacobi exchange."""
+@dataclass(frozen=True, slots=True)
+class Coupled:
+    """Two FMUs that a tool couples, and what they do by our own run.
+
+    Attributes
+    ----------
+    fmus : mapping of str to Path
+        The FMU of each component.
+    outputs : tuple of str
+        All outputs of both that the tool can read, each with its component.
+    rows : ndarray, shape (step, output)
+        The outputs after each step.
+    """
+
+    fmus: dict[str, Path]
+    outputs: tuple[str, ...]
+    rows: Rows
+
+
+def made_pair(name: str, tool: Tool, fmi: str, folder: Path) -> Coupled:
+    """Return the FMUs of a pair, and the outputs that a tool reads by our own importer's Jacobi exchange."""
+    still = {"displacement_start": 0.0}  # else an export that nothing moves starts displaced
+    fmus = {
+        one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=still | parameters)
+        for one, parameters in PAIRS[name].parameters.items()
+    }
+    outputs = tuple(
+        f"{one}.{output}"
+        for one, path in fmus.items()
+        for output in outputs_of(path)
+        if fmi not in tool.without_integers or described(str(path))[output][1] != "integer"
+    )
+    found = pair_run(name, outputs, folder)
+    rows = np.column_stack([found[output] for output in outputs])
+    return Coupled(
+        fmus, outputs, after_exchange(rows, outputs, PAIRS[name]) if tool.exchanges_first else rows
+    )
+
+
+def pair_run(name: str, outputs: Sequence[str], folder: Path) -> dict[str, Rows]:
+    """Return outputs of a pair after each step by our own importer, before the values of the step are exchanged."""
     pair = PAIRS[name]
     gain = {"gain": 1.0, "gain_unit": pair.units} if pair.units else {}
     scene = Scene.from_dict(
         {
             "component": {one: {"fmu": "Oscillator", "parameters": p} for one, p in pair.parameters.items()},
             "connection": [{"from": source, "to": sink, **gain} for source, sink in pair.connections],
-            "record": {"recorded_time": COUNT / RATE, "variables": list(PAIR_OUTPUTS), "rate": RATE},
+            "record": {"recorded_time": COUNT / RATE, "variables": list(outputs), "rate": RATE},
             "execution": {"how": "coupled", "macro_step": 1.0 / RATE, "exchange": "jacobi"},
         }
     )
     run_scene(scene, folder / "pair.nc")
-    samples = open_dataset(folder / "pair.nc").vibroimpact.samples()
-    rows = np.column_stack([samples[dataset_name(output)].values for output in PAIR_OUTPUTS])[1 : COUNT + 1]
-    still = {"displacement_start": 0.0}  # else an export that nothing moves starts displaced
-    fmus = {
-        one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=still | parameters)
-        for one, parameters in pair.parameters.items()
-    }
-    return fmus, rows
+    with open_dataset(folder / "pair.nc") as run:
+        samples = run.vibroimpact.samples()
+        return {output: samples[dataset_name(output)].values[1 : COUNT + 1] for output in outputs}
+
+
+def after_exchange(rows: Rows, outputs: Sequence[str], pair: Pair) -> Rows:
+    """Return the rows of a tool that exchanges values before it writes a row.
+
+    A force on a free mass changes its acceleration at once, by the change of the force over the mass. No other output
+    of these bodies follows an input at once: the absolute acceleration does not depend on that of the base, and no
+    body is held by a stop.
+    """
+    rows = rows.copy()
+    for source, sink in pair.connections:
+        component, _, variable = sink.partition(".")
+        if variable == "force":
+            change = np.diff(rows[:, outputs.index(source)], prepend=0.0)
+            rows[:, outputs.index(f"{component}.acceleration")] += change / pair.mass(component)
+    return rows
 
 
 def difference(rows: Rows, expected: Rows) -> float:

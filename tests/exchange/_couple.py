@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from exchange._single import Request, Rows, columns, load_tbb, run_program, value_references
+from exchange._single import (
+    Request,
+    Rows,
+    columns,
+    described,
+    ecos_reader,
+    libcosim_reader,
+    load_tbb,
+    run_program,
+    value_references,
+)
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -43,10 +53,11 @@ def libcosim(asked: Request) -> Rows:
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
     wanted = [name.split(".", 1) for name in asked["names"]]
+    read = libcosim_reader(observer, [(indices[a], asked["fmus"][a], v) for a, v in wanted])
     rows = []
     for _ in range(asked["count"]):
         execution.step()
-        rows.append([observer.last_real_values(indices[a], [references[a][v]])[0] for a, v in wanted])
+        rows.append(read())
     return rows
 
 
@@ -63,9 +74,11 @@ def ecos(asked: Request) -> Rows:
             structure.make_real_connection(source.replace(".", "::", 1), sink.replace(".", "::", 1))
         with EcosSimulation(structure=structure, step_size=asked["step"]) as simulation:
             simulation.init()
+            wanted = [name.split(".", 1) for name in asked["names"]]
+            read = ecos_reader(simulation, [(a, asked["fmus"][a], v) for a, v in wanted])
             for _ in range(asked["count"]):
                 simulation.step()
-                rows.append([simulation.get_real(name.replace(".", "::", 1)) for name in asked["names"]])
+                rows.append(read())
     return rows
 
 
@@ -119,8 +132,9 @@ def _structure(asked: Request) -> Element:
         for pair in asked["connections"]
         for end, kind in zip(pair, ("output", "input"), strict=True)
     }
-    for component in asked["fmus"]:
-        _add_component(elements, component, sorted(ports))
+    for component, fmu in asked["fmus"].items():
+        kinds = {name: kind for name, (_, kind) in described(fmu).items()}
+        _add_component(elements, component, sorted(ports), kinds)
     connections = SubElement(system, "ssd:Connections")
     for source, sink in asked["connections"]:
         (a, output), (b, into) = source.split(".", 1), sink.split(".", 1)
@@ -130,14 +144,17 @@ def _structure(asked: Request) -> Element:
     return root
 
 
-def _add_component(elements: Element, name: str, ports: Sequence[tuple[str, str]]) -> None:
+def _add_component(
+    elements: Element, name: str, ports: Sequence[tuple[str, str]], kinds: Mapping[str, str]
+) -> None:
     kind = {"type": "application/x-fmu-sharedlibrary", "implementation": "CoSimulation"}
     element = SubElement(elements, "ssd:Component", {"name": name, "source": f"resources/{name}.fmu", **kind})
     connectors = SubElement(element, "ssd:Connectors")
     for port, way in ports:
         component, variable = port.split(".", 1)
         if component == name:
-            SubElement(SubElement(connectors, "ssd:Connector", name=variable, kind=way), "ssc:Real")
+            connector = SubElement(connectors, "ssd:Connector", name=variable, kind=way)
+            SubElement(connector, f"ssc:{kinds[variable].capitalize()}")
 
 
 def _add_master_of_omsimulator(system: Element, step: float) -> None:

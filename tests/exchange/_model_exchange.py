@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -86,14 +87,18 @@ def omsimulator(asked: Request) -> Rows:
 
 
 def _at_steps(rows: Iterable[list[float]], asked: Request) -> Iterator[list[float]]:
-    """Return the rows at the ends of steps; events have rows too."""
+    """Return the rows at the ends of steps; events have rows too.
+
+    A row is NaN where the tool has none: fmusim takes an event within 1e-5 s of the end of a step for that end.
+    """
     at: dict[int, list[float]] = {}
     for time, *row in rows:
         steps = time / asked["step"]
         if abs(steps - round(steps)) < NEAR:
             at[round(steps)] = row
+    none = [math.nan] * len(asked["names"])
     for k in range(1, asked["count"] + 1):
-        yield at[k]
+        yield at.get(k, none)
 
 
 DRIVERS: dict[str, Callable[[Request], Rows]] = {

@@ -35,28 +35,38 @@ def libcosim(asked: Request) -> Rows:
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    variables = described(asked["fmu"])
     execution = CosimExecution.from_step_size(round(asked["step"] * 1e9))
     slave = CosimLocalSlave(asked["fmu"], "body")
     index = execution.add_local_slave(slave)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
+    read = libcosim_reader(observer, [(index, asked["fmu"], name) for name in asked["names"]])
+    rows = []
+    for _ in range(asked["count"]):
+        execution.step()
+        rows.append(read())
+    return rows
+
+
+def libcosim_reader(observer: Any, outputs: Sequence[tuple[int, str, str]]) -> Callable[[], list[float]]:
+    """Return the function that reads outputs, each given by its slave, its FMU and its name."""
     readers = {
         "real": observer.last_real_values,
         "integer": observer.last_integer_values,
         "boolean": observer.last_boolean_values,
     }
-    kinds = [variables[name][1] for name in asked["names"]]
-    references = {
-        kind: [variables[name][0] for name in asked["names"] if variables[name][1] == kind]
-        for kind in dict.fromkeys(kinds)
-    }
-    rows = []
-    for _ in range(asked["count"]):
-        execution.step()
-        found = {kind: iter(readers[kind](index, wanted)) for kind, wanted in references.items()}
-        rows.append([float(next(found[kind])) for kind in kinds])
-    return rows
+    described_by = {fmu: described(fmu) for fmu in {fmu for _, fmu, _ in outputs}}
+    kinds, references = [], {}
+    for slave, fmu, name in outputs:
+        reference, kind = described_by[fmu][name]
+        kinds.append((slave, kind))
+        references.setdefault((slave, kind), []).append(reference)
+
+    def read() -> list[float]:
+        found = {(s, kind): iter(readers[kind](s, there)) for (s, kind), there in references.items()}
+        return [float(next(found[key])) for key in kinds]
+
+    return read
 
 
 KINDS = {"Float64": "real", "Real": "real", "Int64": "integer", "Integer": "integer", "Boolean": "boolean"}
@@ -80,21 +90,28 @@ def ecos(asked: Request) -> Rows:
     load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
 
-    rows, kinds = [], described(asked["fmu"])
+    rows = []
     with EcosSimulationStructure() as structure:
         structure.add_model("body", asked["fmu"])
         with EcosSimulation(structure=structure, step_size=asked["step"]) as simulation:
             simulation.init()
-            readers = {
-                "real": simulation.get_real,
-                "integer": simulation.get_integer,
-                "boolean": simulation.get_bool,
-            }
-            wanted = [(readers[kinds[name][1]], f"body::{name}") for name in asked["names"]]
+            read = ecos_reader(simulation, [("body", asked["fmu"], name) for name in asked["names"]])
             for _ in range(asked["count"]):
                 simulation.step()
-                rows.append([float(read(name)) for read, name in wanted])
+                rows.append(read())
     return rows
+
+
+def ecos_reader(simulation: Any, outputs: Sequence[tuple[str, str, str]]) -> Callable[[], list[float]]:
+    """Return the function that reads outputs, each given by its component, its FMU and its name."""
+    readers = {
+        "real": simulation.get_real,
+        "integer": simulation.get_integer,
+        "boolean": simulation.get_bool,
+    }
+    described_by = {fmu: described(fmu) for fmu in {fmu for _, fmu, _ in outputs}}
+    wanted = [(readers[described_by[fmu][name][1]], f"{one}::{name}") for one, fmu, name in outputs]
+    return lambda: [float(read(name)) for read, name in wanted]
 
 
 def load_tbb() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from exchange._single import Request, Rows, columns, load_tbb, run_program, value_references
+from exchange._single import Request, Rows, columns, ecos_reader, libcosim_reader, load_tbb, run_program
 
 
 def libcosim(asked: Request) -> Rows:
@@ -17,12 +17,12 @@ def libcosim(asked: Request) -> Rows:
     slaves = {info.name.decode(): info.index for info in execution.slave_infos()}
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
-    references = {name: value_references(fmu) for name, fmu in asked["fmus"].items()}
     wanted = [name.split(".", 1) for name in asked["names"]]
+    read = libcosim_reader(observer, [(slaves[a], asked["fmus"][a], v) for a, v in wanted])
     rows = []
     for _ in range(asked["count"]):
         execution.step()
-        rows.append([observer.last_real_values(slaves[a], [references[a][v]])[0] for a, v in wanted])
+        rows.append(read())
     return rows
 
 
@@ -34,9 +34,11 @@ def ecos(asked: Request) -> Rows:
     rows = []
     with EcosSimulation(ssp_path=asked["system"], step_size=asked["step"]) as simulation:
         simulation.init()
+        wanted = [name.split(".", 1) for name in asked["names"]]
+        read = ecos_reader(simulation, [(a, asked["fmus"][a], v) for a, v in wanted])
         for _ in range(asked["count"]):
             simulation.step()
-            rows.append([float(simulation.get_real(name.replace(".", "::", 1))) for name in asked["names"]])
+            rows.append(read())
     return rows
 
 

@@ -45,6 +45,8 @@ class Tool:
         The versions of FMI of which it couples FMUs.
     without_integers : tuple of str
         The versions of FMI whose integers it cannot read: Ecos has half of the room for those of FMI 3.0, and ends.
+    exchanges_first : bool
+        Whether it exchanges the values of a step before it writes the row of the step's end.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Tool:
     program: str = ""
     couples: tuple[str, ...] = ()
     without_integers: tuple[str, ...] = ()
+    exchanges_first: bool = False
 
     def missing(self) -> str:
         """Return why it cannot be tried here, empty where it can."""
@@ -108,10 +111,23 @@ TOOLS = (
     Tool("FMPy", ("2.0", "3.0"), package="fmpy", couples=("2.0",)),
     # libcosim 0.11 speaks FMI 3.0 not at all, and ends with a segmentation fault when it is given such an FMU
     Tool("libcosim", ("2.0",), package="libcosimpy", couples=("2.0",)),
-    Tool("Ecos", ("2.0", "3.0"), package="ecospy", couples=("2.0", "3.0"), without_integers=("3.0",)),
-    Tool("PyFMI", ("2.0",), package="pyfmi", couples=("2.0",)),
+    Tool(
+        "Ecos",
+        ("2.0", "3.0"),
+        package="ecospy",
+        couples=("2.0", "3.0"),
+        without_integers=("3.0",),
+        exchanges_first=True,
+    ),
+    Tool("PyFMI", ("2.0",), package="pyfmi", couples=("2.0",), exchanges_first=True),
     Tool("fmusim", ("2.0", "3.0"), program="fmusim"),
-    Tool("OMSimulator", ("2.0", "3.0"), program="OMSimulator", couples=("2.0", "3.0")),
+    Tool(
+        "OMSimulator",
+        ("2.0", "3.0"),
+        program="OMSimulator",
+        couples=("2.0", "3.0"),
+        exchanges_first=True,
+    ),
     Tool("FMU Compliance Checker", ("2.0",), program="fmuCheck.linux64"),
 )
 

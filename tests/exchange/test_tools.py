@@ -16,7 +16,6 @@ from exchange._cases import (
     COUNT,
     IMPACT_STOP,
     NAMES,
-    PAIR_OUTPUTS,
     PAIRS,
     RATE,
     REPLAY,
@@ -91,13 +90,13 @@ def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Pat
 def test_two_exports_that_another_tool_couples_are_our_own_run(tmp_path: Path, tool: Tool, fmi: str) -> None:
     skip_where_missing(tool)
     name = "a spring between them"  # the one whose both ends are inputs; `make exchange` has the other too
-    fmus, expected = made_pair(name, fmi, tmp_path)
-    answer = run_coupled(tool, fmus, PAIRS[name].connections, PAIR_OUTPUTS, 1.0 / RATE, COUNT, tmp_path)
+    it = made_pair(name, tool, fmi, tmp_path)
+    answer = run_coupled(tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, tmp_path)
     rows = np.array(answer.rows)
-    assert rows.shape == expected.shape
-    jumps = np.abs(np.diff(expected[:, PAIR_OUTPUTS.index("b.velocity")]))
+    assert rows.shape == it.rows.shape
+    jumps = np.abs(np.diff(it.rows[:, it.outputs.index("b.velocity")]))
     assert jumps.max() > 10.0 * np.median(jumps), "b is expected to hit its stops"
-    assert difference(rows, expected) <= 1e-9
+    assert difference(rows, it.rows) <= 1e-9
     assert not answer.complaints
 
 
