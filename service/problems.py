@@ -21,6 +21,10 @@ RETRY_HELD = 2
 """Seconds after which a client may ask again that found the database held."""
 METHODS = ("GET", "POST", "DELETE")
 MEDIA_TYPE = "application/problem+json"
+MOST_PROBLEMS = 50
+"""Problems that one answer lists; the client mends these first."""
+MOST_CHARACTERS = 1000
+"""Length of a message, above which its middle is left out: messages repeat what the client sent."""
 
 
 class ProblemError(Exception):
@@ -47,8 +51,25 @@ def answer(
     status: int, detail: str, headers: Mapping[str, str] | None = None, **members: Any
 ) -> JSONResponse:
     """Return a problem as a response."""
-    content = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail}
+    content = {
+        "type": "about:blank",
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "detail": shortened(detail),
+    }
     return JSONResponse(content | members, status, dict(headers or {}), MEDIA_TYPE)
+
+
+def shortened(text: str) -> str:
+    """Return a text of at most `MOST_CHARACTERS`: a longer one without its middle.
+
+    >>> shortened("a" * 600 + "b" * 600) == "a" * 498 + " ... " + "b" * 497
+    True
+    """
+    if len(text) <= MOST_CHARACTERS:
+        return text
+    half = (MOST_CHARACTERS - 5) // 2
+    return f"{text[: half + 1]} ... {text[-half:]}"
 
 
 def is_held(error: Exception) -> bool:
@@ -106,8 +127,8 @@ def answer_problems(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     def of_validation(_: Request, error: RequestValidationError) -> JSONResponse:
         problems = [
-            {"message": f"{'.'.join(str(part) for part in one['loc'])}: {one['msg']}"}
-            for one in error.errors()
+            {"message": shortened(f"{'.'.join(str(part) for part in one['loc'])}: {one['msg']}")}
+            for one in error.errors()[:MOST_PROBLEMS]
         ]
         detail = problems[0]["message"] if problems else "the request does not fit"
         return answer(HTTPStatus.UNPROCESSABLE_ENTITY, detail, problems=problems)

@@ -16,20 +16,15 @@ from vibroimpact.orchestrator.scene.file import parse_scene_toml
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.text import text_with_values
 from vibroimpact.service.fmus import FmuStore
+from vibroimpact.service.places import Places
+from vibroimpact.service.problems import MOST_PROBLEMS, shortened
 from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.store import Kind
 
 SOURCE = "scene"
 """What messages about a submitted scene begin with."""
-_SYNTAX = re.compile(r"line (\d+), column (\d+)")
-_KEY = re.compile(rf"^{SOURCE}: ([A-Za-z_][\w\-]*(?:\[\d+\])?(?:\.[\w\-\"]+(?:\[\d+\])?)*): ")
-_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
-_TEXT = re.compile(
-    r'''"""(?:\\.|[^\\])*?"""|\'{3}.*?\'{3}|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*''', re.DOTALL
-)
-"""Texts and comments of TOML, of which those of several lines are looked for."""
-BOM = "\ufeff"
-_ENTRY = re.compile(r"^(\s*)([\w\-\".]+)\s*=")
+_SYNTAX = re.compile(rf"{SOURCE}: line (\d{{1,9}})(?:, column (\d{{1,9}}))?: ")
+_KEY = re.compile(rf"{SOURCE}: ([A-Za-z_][\w\-]*(?:\[\d+\])?(?:\.[\w\-\"]+(?:\[\d+\])?)*): ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,59 +144,30 @@ def linked(key: str, name: Any, shelf: Shelf, files: dict[str, Path]) -> list[st
     return []
 
 
-def located(problem: str, text: str) -> dict[str, Any]:
-    """Return a problem with its line and column in the text, both from 1; those of its table where its key is absent.
+def located(problems: Sequence[str], text: str) -> list[dict[str, Any]]:
+    """Return problems with their lines and columns in the text, from 1; above `MOST_PROBLEMS` their number.
+
+    Where a key is absent, the place is that of its table.
 
     Examples
     --------
-    >>> located("scene: body.mass: expected a number > 0, got -1.", "# a mass\\n[body]\\n  mass = -1")
-    {'message': 'body.mass: expected a number > 0, got -1.', 'line': 3, 'column': 3}
+    >>> located(["scene: body.mass: expected a number > 0, got -1."], "# a mass\\n[body]\\n  mass = -1")
+    [{'message': 'body.mass: expected a number > 0, got -1.', 'line': 3, 'column': 3}]
     """
-    message = problem.removeprefix(f"{SOURCE}: ")
-    syntax = _SYNTAX.search(problem)
+    places, more = Places(text), len(problems) - MOST_PROBLEMS
+    if more > 1:  # one more is the number of those that the scene reader has left out
+        problems = [*problems[:MOST_PROBLEMS], f"{SOURCE}: and {more} more problems."]
+    return [_located(problem, places) for problem in problems]
+
+
+def _located(problem: str, places: Places) -> dict[str, Any]:
+    message = shortened(problem.removeprefix(f"{SOURCE}: "))
+    syntax, key = _SYNTAX.match(problem), _KEY.match(problem)
     if syntax:
-        return {"message": message, "line": int(syntax[1]), "column": int(syntax[2])}
-    key = _KEY.match(problem)
-    line, column = _place(key[1], text) if key else (1, 1)
+        line, column = int(syntax[1]), int(syntax[2] or 1)
+    else:
+        line, column = places.of(key[1]) if key else (1, 1)
     return {"message": message, "line": line, "column": column}
-
-
-def _place(key: str, text: str) -> tuple[int, int]:
-    """Return where a key such as `stop[2].position` is written; else its nearest table; else the beginning."""
-    wanted = re.sub(r"\[(\d+)\]$", "", key)
-    table, best, counts = "", (1, 1, 0), dict[str, int]()
-    # TOML ends lines at these alone; and what a text of several lines holds is no key
-    for number, line in enumerate(_TEXT.sub(_blank, text.removeprefix(BOM)).split("\n"), 1):
-        header, entry = _HEADER.match(line), _ENTRY.match(line)
-        column = 1
-        if header:
-            table = header[2].replace('"', "")
-            if header[1] == "[[":
-                counts[table] = counts.get(table, 0) + 1
-                table = f"{table}[{counts[table]}]"
-            full = table
-        elif entry:
-            full = f"{table}.{entry[2]}".lstrip(".").replace('"', "")
-            column = len(entry[1]) + 1
-        else:
-            continue
-        shared = len(full) if wanted == full or wanted.startswith((f"{full}.", f"{full}[")) else 0
-        if shared > best[2]:
-            best = (number, _within(line, column, wanted[len(full) :]) if entry else column, shared)
-    return best[:2]
-
-
-def _within(line: str, column: int, rest: str) -> int:
-    """Return the column of what is left of a key in the inline tables of a line; else that of the line's own key."""
-    index = re.match(r"\[(\d+)\]", rest)
-    name = re.escape(rest.rpartition(".")[2])
-    found = [one.start(1) + 1 for one in re.finditer(rf"[{{,\s](\"?{name}\"?)\s*=", line)] if name else []
-    place = int(index[1]) - 1 if index else 0
-    return found[place] if place < len(found) else column
-
-
-def _blank(text: re.Match[str]) -> str:
-    return "\n" * text[0].count("\n") or text[0]
 
 
 def title_of(text: str) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import re
 import time
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import urlsplit
 
 SECONDS = 12 * 3600
@@ -37,6 +37,7 @@ class Sessions:
         self._key = token.encode()
         # browsers send cookies to all ports of a machine: each service has a name of its own
         self.cookie = f"vibroimpact-{self._signed('name')[:12]}"
+        self._value = re.compile(rf"(?:^|[; ]){self.cookie}=([0-9]{{1,12}}\.[0-9a-f]{{64}})(?=;|$)")
 
     def made(self) -> str:
         """Return the value of a new session."""
@@ -51,11 +52,9 @@ class Sessions:
 
     def are_in(self, headers: dict[bytes, bytes], method: str) -> bool:
         """Whether a request carries a session, and comes from the page of this service itself."""
-        try:
-            found = SimpleCookie(headers.get(b"cookie", b"").decode("latin-1")).get(self.cookie)
-        except CookieError:
-            return False
-        if found is None or not self.is_known(found.value):
+        # the sender is not known yet: one cookie is looked for, the others are not parsed
+        found = self._value.search(headers.get(b"cookie", b"").decode("latin-1"))
+        if found is None or not self.is_known(found[1]):
             return False
         if headers.get(b"sec-fetch-site", b"none").decode("latin-1") not in OWN_SITES:
             return False

@@ -43,7 +43,7 @@ CHANGES = "--set"
 """The option that changes keys of a scene."""
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
-_TOML_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\Z")
+_TOML_PLACE = re.compile(r"\(at (?:line (\d+), column (\d+)|end of document)\)\Z")
 _NUMBER_IN_TEXT = re.compile(r"\s*[-+.]?\d")
 
 _SYNTAX_HINTS = {
@@ -327,7 +327,7 @@ def syntax_problem(error: ValueError, text: str) -> Problem:
         return Problem("", "numbers of a usual length", "one of thousands of digits")
     message = str(error)
     place = _TOML_PLACE.search(message)
-    what = message[: place.start()] if place else message
+    what = message[: place.start()].rstrip() if place else message
     hint = next((advice for start, advice in _SYNTAX_HINTS.items() if start in what), "")
     said = f"{what.rstrip('.')}. {hint}".rstrip()
     lines = re.split(r"\r?\n", text.rstrip())

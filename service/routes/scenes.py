@@ -46,7 +46,7 @@ def scenes_router(shelf: Shelf) -> APIRouter:
         try:
             taken_scene(given.scene, shelf)
         except SceneError as error:
-            found = [SceneProblem(**located(problem, given.scene)) for problem in error.problems]
+            found = [SceneProblem(**one) for one in located(error.problems, given.scene)]
             return Validation(problems=found)
         return Validation(problems=[])
 
@@ -55,5 +55,5 @@ def scenes_router(shelf: Shelf) -> APIRouter:
 
 def refused_scene(error: SceneError, text: str) -> ProblemError:
     """Return the refusal of a scene, with all of its problems."""
-    found = [located(problem, text) for problem in error.problems]
+    found = located(error.problems, text)
     return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, found[0]["message"], problems=found)

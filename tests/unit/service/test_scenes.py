@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import pytest
 
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.scene.file import parse_scene_toml
 from vibroimpact.service.scenes import located
 
 
@@ -25,15 +28,63 @@ from vibroimpact.service.scenes import located
         ("body.mass", '# """\nt = """\n[body]\nmass = 3\n"""\n[body]\nmass = -1', 7, 1),
         ("body.mass", "t = '''\n[body]\nmass = 3\n'''\n[body]\nmass = -1", 6, 1),
         ("body.mass", "[scene]\ntitle = 'a\u2028b\x85c'\n[body]\nmass = -1", 4, 1),
+        ("body.mass", "x = ['''a'''', '#']\n[body]\nmass = -1", 3, 1),
+        ("body.mass", 'x = """a"""""\ny = """b\\"""\n[body]\nmass = 3\n"""\n[body]\nmass = -1', 7, 1),
     ],
 )
 def test_a_problem_is_where_its_key_is_written(key: str, text: str, line: int, column: int) -> None:
-    found = located(f"scene: {key}: expected a number > 0, got -1.", text)
+    (found,) = located([f"scene: {key}: expected a number > 0, got -1."], text)
     assert (found["line"], found["column"]) == (line, column)
 
 
-def test_the_place_in_a_megabyte_of_quotes_is_found_at_once() -> None:
-    text = "# " + '"""\\' * 250_000 + "\n[body]\nmass = -1"
+HEADER = "\n[body]\nmass = -1\n"
+HOSTILE = {
+    "quotes after a text that four quotes end": lambda n: "x = ['''a'''', '" + '\\"' * (n // 2) + "']",
+    "a comment of quotes": lambda n: "# " + '"""\\' * (n // 4),
+    "texts that do not end": lambda n: "'" + '"""' + "\\'" * (n // 2),
+    "brackets and blanks": lambda n: "x = [\n[" + " " * n + "\n]",
+    "brackets, text and blanks": lambda n: "x = [\n[1" + " " * n + "1]]",
+    "blanks before a key": lambda n: " " * n + "y = 1",
+    "blanks after a key": lambda n: "body.y" + " " * n + "\n",
+    "many keys": lambda n: "".join(f"k{number} = 1\n" for number in range(n // 9)),
+    "many tables": lambda n: "".join(f"[[t{number}]]\n" for number in range(n // 9)),
+}
+
+
+def processor_time(call: Callable[[], object]) -> float:
+    """Return the least processor time of three calls, s."""
+    times = []
+    for _ in range(3):
+        began = time.process_time()
+        call()
+        times.append(time.process_time() - began)
+    return min(times)
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_fifty_problems_are_placed_in_time_that_grows_with_the_text(kind: str) -> None:
+    problems = ["scene: body.mass: expected a number > 0, got -1."] * 50
+
+    def seconds(length: int) -> float:
+        text = HOSTILE[kind](length) + HEADER
+        assert located(problems, text)[49]["line"] == text.count("\n")
+        return processor_time(lambda: located(problems, text))
+
+    short, long = seconds(2**17), seconds(2**19)
+    assert long < max(4.0**1.3 * short, 0.02)
+
+
+@pytest.mark.parametrize("key", ["a", " ", "a ", '\\"'])
+def test_a_key_of_64_kb_that_is_given_twice_is_refused_at_once(key: str) -> None:
+    line = f'["{key * (65_000 // len(key))}"]\n'
     began = time.process_time()
-    assert located("scene: body.mass: expected a number > 0, got -1.", text)["line"] == 3
-    assert time.process_time() - began < 5.0
+    with pytest.raises(SceneError, match="expected valid TOML"):
+        parse_scene_toml(line * 2, "scene")
+    assert time.process_time() - began < 0.5
+
+
+def test_no_answer_repeats_more_than_fifty_problems_or_a_megabyte_of_a_key() -> None:
+    found = located([f"scene: {'k' * 1_000_000}: unknown key."] * 1000, "")
+    assert len(found) == 51
+    assert found[50]["message"] == "and 950 more problems."
+    assert max(len(one["message"]) for one in found) <= 1000

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from vibroimpact.service import sessions as module
@@ -40,6 +42,17 @@ def test_a_session_ends_with_its_time_and_with_its_token(monkeypatch: pytest.Mon
     assert not Sessions("other").is_known(value)
     monkeypatch.setattr(module.time, "time", lambda: float(value.partition(".")[0]) + 1.0)
     assert not Sessions("token").is_known(value)
+
+
+@pytest.mark.parametrize(
+    "filler", ['x="' + "\\" * 60_000 + '"', "; " * 30_000, "vibroimpact-" * 5_000, "a=1; " * 12_000]
+)
+def test_a_cookie_header_of_a_stranger_is_looked_through_at_once(filler: str) -> None:
+    sessions = Sessions("token")
+    began = time.process_time()
+    assert not sessions.are_in({b"cookie": filler.encode()}, "GET")
+    assert sessions.are_in({b"cookie": f"{filler}; {sessions.cookie}={sessions.made()}".encode()}, "GET")
+    assert time.process_time() - began < 0.1
 
 
 def test_the_files_of_the_page_name_no_other_host() -> None:
