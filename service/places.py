@@ -1,4 +1,4 @@
-"""Where the keys of a TOML text are written: one pass over the text, in time in proportion to its length."""
+"""Places of the keys of a TOML text, found in one pass over it."""
 
 from __future__ import annotations
 

@@ -269,7 +269,7 @@ def _off_return(amplitude: float, w: float, ratio: float) -> float:
 
 
 def _off_touch(amplitude: float, w: float) -> float:
-    """Return how far a body is from its stop, at -1, whose force 1 + amplitude cos(w t) only touches 0 each period."""
+    """Return the distance of a body from its stop at -1. The force 1 + amplitude cos(w t) only touches 0 there."""
     periods = 5
     record = run(
         body=PLAIN | {"displacement_start": -1.0},

@@ -145,7 +145,7 @@ class TimeSeriesPlan:
 
 
 def few_samples_message(durations: NDArray[np.float64], rate: float, *, has_peaks: bool) -> str:
-    """Return what a run says whose samples miss largest forces, as contacts have too few; nothing where they do not.
+    """Return what a run says whose contacts have too few samples for their largest forces; empty where none has.
 
     Parameters
     ----------
