@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import netCDF4
 import numpy as np
@@ -18,7 +18,7 @@ from vibroimpact.analysis.dataset import RULES
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG
 from vibroimpact.analysis.files.opening import opened_netcdf
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.service.run_classes import can_be_classified, codes_of
+from vibroimpact.service.run_classes import ClassColumns, can_be_classified
 
 READING = threading.Lock()
 """Held while a file is read or drawn: neither the library of NetCDF nor the style of a page is made for threads."""
@@ -39,6 +39,8 @@ MOST_CACHED = 2**27
 FAILURE_BYTES = 512
 """Memory that a failure takes, about."""
 Found = TypeVar("Found")
+Later: TypeAlias = Callable[[], Found]
+"""The rest of an answer, which needs no file any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +78,7 @@ class Landed:
         Which of the runs a row belongs to, by its place.
     values : ndarray of float, shape (row,)
     is_class : bool
-        Whether the values are codes of classes (`run_classes.codes_of`).
+        Whether the values are codes of classes (`run_classes.ClassColumns.codes`).
     """
 
     quantities: tuple[Quantity, ...]
@@ -135,9 +137,14 @@ class LandedReader:
             A file is damaged.
         """
 
-        def piece(file: netCDF4.Dataset) -> tuple[Landed | None, int]:
-            found = _read(file, variable)
-            return found, 0 if found is None else found.size
+        def piece(file: netCDF4.Dataset) -> Later[tuple[Landed | None, int]]:
+            make = _read(file, variable)
+
+            def made() -> tuple[Landed | None, int]:
+                found = make()
+                return found, 0 if found is None else found.size
+
+            return made
 
         found = self._from_each(files, variable, piece)
         pieces = [one for one in found if one is not None]
@@ -154,9 +161,9 @@ class LandedReader:
             A file is damaged.
         """
 
-        def failed(file: netCDF4.Dataset) -> tuple[list[Failure], int]:
+        def failed(file: netCDF4.Dataset) -> Later[tuple[list[Failure], int]]:
             found = _failures(file, outcomes)
-            return found, FAILURE_BYTES * (1 + len(found))
+            return lambda: (found, FAILURE_BYTES * (1 + len(found)))
 
         each = self._from_each(files, tuple(outcomes), failed)
         return sorted((one for found in each for one in found), key=lambda one: one.run)
@@ -165,9 +172,9 @@ class LandedReader:
         self,
         files: Sequence[Path],
         question: Hashable,
-        read: Callable[[netCDF4.Dataset], tuple[Found, int]],
+        read: Callable[[netCDF4.Dataset], Later[tuple[Found, int]]],
     ) -> list[Found]:
-        """Return what `read` finds in each file that is still there; it says how many bytes that takes."""
+        """Return the answer of each file that is still there; `read` also gives the bytes that an answer takes."""
         answers = []
         for path in files:
             try:
@@ -179,20 +186,23 @@ class LandedReader:
         return answers
 
     def _remembered(
-        self, path: Path, question: Hashable, read: Callable[[netCDF4.Dataset], tuple[Found, int]]
+        self, path: Path, question: Hashable, read: Callable[[netCDF4.Dataset], Later[tuple[Found, int]]]
     ) -> Found:
         state = path.stat()
         key = (path, state.st_mtime_ns, state.st_size, question)
         with READING:
             if key in self._known:
                 self._known.move_to_end(key)
-            else:
-                with opened_netcdf(path) as file:
-                    self._known[key] = read(file)
-                while sum(size for _, size in self._known.values()) > MOST_CACHED and len(self._known) > 1:
-                    self._known.popitem(last=False)
-            found: Found = self._known[key][0]
-            return found
+                known: Found = self._known[key][0]
+                return known
+            with opened_netcdf(path) as file:
+                make = read(file)
+        answer = make()
+        with READING:
+            self._known[key] = answer
+            while sum(size for _, size in self._known.values()) > MOST_CACHED and len(self._known) > 1:
+                self._known.popitem(last=False)
+        return answer[0]
 
 
 def files_of(campaign: Path) -> list[Path]:
@@ -225,25 +235,30 @@ def _failures(file: netCDF4.Dataset, outcomes: Sequence[int]) -> list[Failure]:
     ]
 
 
-def _read(file: netCDF4.Dataset, variable: str) -> Landed | None:
+def _read(file: netCDF4.Dataset, variable: str) -> Later[Landed | None]:
     axes = axes_of(file)
     quantities = tuple(_quantities(file, axes))
     found = next((one for one in quantities if one.name == variable), None)
     if found is None:
-        return None
+        return lambda: None
     runs = file["run_index"][:].astype(np.int64)
-    owners, values = _rows(file, found, runs.size)
-    return Landed(
+    landed = Landed(
         quantities,
         tuple(_axis(file[name]) for name in axes),
         runs,
         file["direction"][:],
         file["outcome"][:],
         np.array([file[name][:] for name in axes], dtype=np.float64).reshape(len(axes), runs.size),
-        owners,
-        values,
+        np.arange(runs.size, dtype=np.int64),
+        np.empty(runs.size),
         variable == CLASS,
     )
+    if variable == CLASS:
+        # classes of many runs take seconds, in which other requests read files
+        columns = ClassColumns.of(file)
+        return lambda: replace(landed, values=columns.codes())
+    owners, values = _rows(file, found, runs.size)
+    return lambda: replace(landed, owners=owners, values=values)
 
 
 def _axis(variable: netCDF4.Variable[Any]) -> Quantity:
@@ -301,8 +316,6 @@ def _rows(
         there = ~np.isnan(each)
         mean = np.sum(each, axis=1, where=there) / np.maximum(there.sum(axis=1), 1)
         return places, np.where(mean > 0.0, mean, np.nan)
-    if asked.name == CLASS:
-        return places, codes_of(file)
     variable = file[asked.name]
     values = np.asarray(variable[...], dtype=np.float64)
     if variable.dimensions[0] == "run":

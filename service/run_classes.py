@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 from typing import Any
 
 import netCDF4
@@ -27,20 +28,41 @@ def can_be_classified(file: netCDF4.Dataset) -> bool:
     return bool(columns) and all(file[name].long_name != OF_ALL_PERIODS.get(name, "") for name in columns)
 
 
-def codes_of(file: netCDF4.Dataset) -> NDArray[np.float64]:
-    """Return the class of each run of a file as a number, shape (run,)."""
-    from vibroimpact.analysis.orbits.classify import class_of  # xarray takes half a second to load
+@dataclass(frozen=True, slots=True)
+class ClassColumns:
+    """The values of a file that tell the classes of its runs; read at once, classified without the file.
 
-    states = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in _columns(file)], axis=-1)
-    counts = file["impacts_per_period"][:] if "impacts_per_period" in file.variables else None
-    sticks = file["stick_count"][:] if "stick_count" in file.variables else np.zeros(len(states))
-    outcomes = file["outcome"][:]
-    found = np.empty(len(states))
-    for run, own in enumerate(states):
-        impacts = None if counts is None else counts[run]
-        one = class_of(own, impacts, Outcome(int(outcomes[run])), bool(sticks[run] > 0))
-        found[run] = int(one.kind) + _KINDS * ((one.impacts + 1) + _MOST_IMPACTS * one.periods)
-    return found
+    Attributes
+    ----------
+    states : ndarray of float, shape (run, period, state)
+    impacts : ndarray of int, shape (run, period), or None
+        Impacts of each period, where the file has them.
+    outcomes, sticks : ndarray of int, shape (run,)
+    """
+
+    states: NDArray[np.float64]
+    impacts: NDArray[np.int64] | None
+    outcomes: NDArray[np.int8]
+    sticks: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, file: netCDF4.Dataset) -> ClassColumns:
+        """Read them from an open file."""
+        states = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in _columns(file)], axis=-1)
+        impacts = file["impacts_per_period"][:] if "impacts_per_period" in file.variables else None
+        sticks = file["stick_count"][:] if "stick_count" in file.variables else np.zeros(len(states), int)
+        return cls(states, impacts, file["outcome"][:], sticks)
+
+    def codes(self) -> NDArray[np.float64]:
+        """Return the class of each run as a number, shape (run,)."""
+        from vibroimpact.analysis.orbits.classify import class_of  # xarray takes half a second to load
+
+        found = np.empty(len(self.states))
+        for run, own in enumerate(self.states):
+            impacts = None if self.impacts is None else self.impacts[run]
+            one = class_of(own, impacts, Outcome(int(self.outcomes[run])), bool(self.sticks[run] > 0))
+            found[run] = int(one.kind) + _KINDS * ((one.impacts + 1) + _MOST_IMPACTS * one.periods)
+        return found
 
 
 def named_classes(codes: NDArray[np.float64]) -> tuple[list[str], NDArray[np.float64]]:

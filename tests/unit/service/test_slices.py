@@ -5,14 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import vibroimpact as vi
 from vibroimpact.analysis.figures import largest_impact_velocity
 from vibroimpact.analysis.orbits.classify import classify
 from vibroimpact.orchestrator.campaign import run_campaign, run_scene
-from vibroimpact.service.landed import LandedReader, files_of
+from vibroimpact.service.landed import READING, LandedReader, files_of
 from vibroimpact.service.page_api import examples_folder
 from vibroimpact.service.point_process import simulated
+from vibroimpact.service.run_classes import ClassColumns
 from vibroimpact.service.slices import Selection, slice_of
 
 SCENE = """
@@ -125,6 +127,20 @@ def test_a_map_can_be_of_what_plot_draws_maps_of(file: Path) -> None:
     counts = [names.count(name) for name in told["classes"]]
     assert counts == sorted(counts, reverse=True)
     assert answers["largest_impact_velocity"]["classes"] == []
+
+
+def test_other_files_can_be_read_while_classes_are_found(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    codes, locked = ClassColumns.codes, []
+
+    def watched(columns: ClassColumns) -> NDArray[np.float64]:
+        locked.append(READING.locked())
+        return codes(columns)
+
+    monkeypatch.setattr(ClassColumns, "codes", watched)
+    landed = LandedReader().read([file], "class")
+    assert landed is not None
+    assert landed.values.size == landed.owners.size
+    assert locked == [False]
 
 
 def test_keys_that_move_together_are_one_axis_of_a_map(tmp_path: Path) -> None:
