@@ -180,6 +180,35 @@ def test_a_rigid_stop_and_one_that_yields_meet_the_same_body() -> None:
 # ---- a stop of other people's, without slopes and without states ----
 
 
+def test_a_contact_that_begins_a_rounding_inside_does_not_let_go_at_once() -> None:
+    # the tip of this beam is found 1e-308 m in the stop at its third touch-down
+    scene = """
+    [body]
+    kind = "beam"
+    length = 1.0
+    mass_per_length = 1.0
+    flexural_rigidity = 1.0
+    modes = 5
+    damping_ratio = 0.02
+    velocity_start = [1.0]
+    [[stop]]
+    position = 0.1
+    location = 0.8
+    law = "hunt_crossley"
+    stiffness = 26175.217073755448
+    damping = 2.0
+    exponent = 1.0
+    [forcing]
+    amplitude = 1.0
+    phase = 1.0
+    angular_frequency = 0.0
+    [record]
+    recorded_time = 1.8
+    """
+    coupled_there = final_velocity(f'{scene}[execution]\nhow = "coupled"\nmacro_step = 0.11153293440025046\n')
+    assert coupled_there == pytest.approx(final_velocity(scene), abs=1e-4)
+
+
 def test_a_stateless_spring_is_off_at_its_first_contact_by_the_first_step_alone(tmp_path: Path) -> None:
     # force = 1e4 (x - 1), FMI 2.0, no states: no step can be repeated; the slopes are those of the step before
     steps, w = 30, 100.0

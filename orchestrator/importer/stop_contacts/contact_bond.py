@@ -256,7 +256,8 @@ class ContactBond:
         missed = now.force - max(0.0, start.force_at(now.penetration, now.rate))
         if self._corrected or (abs(missed) <= FORCE_TOLERANCE * self._largest_force and not lets_go):
             return False
-        if start.force > 0.0 and now.force > 0.0:
+        # a touch-down may find the point a rounding inside: a line bent from there may let go at once
+        if start.force > FORCE_TOLERANCE * self._largest_force and now.force > 0.0:
             self._bend(now)
         elif now.force > 0.0:
             exponent = now.stiffness * now.penetration / now.force
