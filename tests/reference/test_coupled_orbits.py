@@ -176,6 +176,19 @@ def test_no_row_is_lost_wherever_an_impact_fills_the_record(transient: int) -> N
     assert len(impacts_of(record)) == record.periods[:, 4].sum() == 450
 
 
+def test_no_row_is_lost_of_a_stop_that_yields_and_fills_the_record_several_times() -> None:
+    """A contact has a row of its own and one for its peak: the record of 496 rows is full after some 160 periods."""
+    text = (EXAMPLES / "bifurcation.toml").read_text(encoding="utf-8")
+    text = text.replace('law = "restitution"', 'law = "kelvin_voigt"\nstiffness = 500.0\ndamping = 0.5')
+    text = text.replace("restitution = 0.7", "").replace("transient_periods = 1000", "transient_periods = 10")
+    scene = parse_scene(text.replace("recorded_periods = 20", "recorded_periods = 340"), "yielding.toml")
+    found = run(scene, "coupled", {"forcing.angular_frequency": 1.0})
+    assert found.periods is not None
+    assert len(found.periods) == 340
+    assert len(impacts_of(found)) == found.periods[:, 4].sum() >= 340
+    assert np.isfinite(impacts_of(found)[:, -1]).sum() >= 339
+
+
 def test_a_record_of_more_periods_than_the_body_keeps_loses_none_without_impacts() -> None:
     scene = example("bifurcation.toml", 2000)
     records = [run(scene, how, {"forcing.angular_frequency": 1.6}) for how in ("fused", "coupled")]
