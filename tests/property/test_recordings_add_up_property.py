@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.cut_recordings import counts_differ, problem_of_cuts
@@ -104,8 +104,17 @@ def scenes(draw: st.DrawFn) -> Scene:
     return parse_scene(f"{text}[record]\n{window}\n", "scene.toml")
 
 
+def cut_at_its_release() -> Scene:
+    """Return a beam whose rest is over at an instant at which rounding presses it once more."""
+    forcing = "[forcing]\namplitude = 1.0\nangular_frequency = 2.501043067472021\n"
+    stop = "[[stop]]\nposition = 0.3\nrestitution = 0.0\n[record]\nrecorded_periods = 1\n"
+    body = BEAM.format(stiffness=1.0, damping=0.3, displacement=0.0, velocity=0.0)
+    return parse_scene(body + forcing + stop, "scene.toml")
+
+
 @settings(max_examples=120)
 @given(scene=scenes(), share=st.floats(0.0, 0.999))
+@example(scene=cut_at_its_release(), share=0.0)
 def test_recordings_of_a_fused_body_add_up(scene: Scene, share: float) -> None:
     assert problem_of_cuts(scene, "fused", share, 12.0) is None
 

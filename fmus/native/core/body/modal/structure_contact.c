@@ -31,6 +31,15 @@ void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_i
     vi_contact_stick(&s->contacts[k], &s->model->clock, state->now, delay);
 }
 
+/* Is the rest that ends at contact k one to record? A body that a run let go at this very instant may be found pressed
+ * again by the rounding of its loads, for the rounding of the time. */
+static bool is_rest(const vi_structure *s, int k)
+{
+    const vi_contact *contact = &s->contacts[k];
+    const double rounding = VI_ROUNDING * fabs(contact->stick_end);
+    return contact->stick_end - contact->stick_start > rounding || s->state->tail_impulse[k] > 0.0;
+}
+
 /* Which contacts touch only because contact k holds their point. */
 static void those_held_by(const vi_structure *s, int k, int touching[])
 {
@@ -50,7 +59,7 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
     vi_contact *contact = &s->contacts[k];
     int touching[VI_PORTS];
     vi_contact_lift(contact, &s->model->clock, s->state->now);
-    if (!contact->earlier && (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0)) {
+    if (!contact->earlier && is_rest(s, k)) {
         vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
     }
     those_held_by(s, k, touching);
