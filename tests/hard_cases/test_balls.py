@@ -36,6 +36,7 @@ def test_a_falling_ball_meets_every_bounce_and_comes_to_rest_on_time(
             o.contact("stuck")[0],
             o.get("contact[1].force"),
         )
+        impulse = o.get("contact[1].total_impulse")
     impacts = rows[rows[:, 0] == 1.0]
     n = np.arange(len(impacts))
     times = first + 2.0 * first * r * (1.0 - r**n) / (1.0 - r)
@@ -46,6 +47,8 @@ def test_a_falling_ball_meets_every_bounce_and_comes_to_rest_on_time(
     assert abs(start - first * (1.0 + r) / (1.0 - r)) <= SEQUENCE * scale
     assert stuck
     assert force == GRAVITY
+    # momentum: the speed of the first impact, and gravity up to the rest; the summed tail has 1e-4 of it
+    assert impulse == pytest.approx(speed * (1.0 + r) / (1.0 - r), rel=SEQUENCE * scale)
     assert len(impacts) >= math.log(1e-3) / math.log(r)
 
 
@@ -125,6 +128,14 @@ def test_a_mass_that_starts_on_a_stop_and_leaves_it_meets_nothing() -> None:
         o.step(3.0)
         assert o.contact("count", "graze_count") == [0, 0]
         assert o.get("displacement") == 3.0
+
+
+@pytest.mark.parametrize("roundings", [0, 1, 2, 64])
+def test_a_peak_over_the_stop_by_no_more_than_rounding_is_a_graze(roundings: int) -> None:
+    parameters = {"velocity_start": 1.0 + roundings * np.finfo(float).eps}
+    with OscillatorFmu({**parameters, **stop(1.0, 0.5)}) as o:
+        o.step(3.0)
+        assert o.contact("count", "graze_count") == ([1, 0] if roundings == 64 else [0, 1])
 
 
 @pytest.mark.parametrize("k", [3.0, 7.0, 0.7, 1.3])

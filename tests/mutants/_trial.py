@@ -31,6 +31,7 @@ QUICK = (
         "hard_cases/test_balls.py",
     ),
     *("hard_cases/test_structures_grazing.py", "hard_cases/test_structures_stops.py"),
+    *("hard_cases/test_structures_compliant.py",),
     *("hard_cases/test_long_rests.py", "hard_cases/test_structures_extremes.py"),
     *("unit/fmus/native/test_oscillator_fmu.py", "unit/fmus/native/test_chain_fmu.py"),
     *("unit/fmus/native/test_beam_fmu.py",),

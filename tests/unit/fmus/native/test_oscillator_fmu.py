@@ -72,3 +72,16 @@ def test_the_outputs_follow_an_input_set_between_steps() -> None:
         o.set("base_acceleration", 1.0)
         # absolute: the relative one is 2 - .5 - 1
         assert abs(o.get("acceleration") - 1.5) <= ROUNDING
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.05])
+def test_a_step_has_the_damping_of_the_amplitude_that_it_begins_with(slope: float) -> None:
+    mass, stiffness, time, ratio = 2.0, 800.0, 0.1, 0.002 + slope
+    parameters = {"mass": mass, "stiffness": stiffness, "damping": 0.16, "displacement_start": 1.0}
+    with OscillatorFmu({**parameters, "amplitude.damping_slope": slope}) as o:
+        o.step(time)
+        found = o.get("displacement")
+    natural = math.sqrt(stiffness / mass)
+    damped = natural * math.sqrt(1.0 - ratio**2)
+    swing = math.cos(damped * time) + ratio * natural / damped * math.sin(damped * time)
+    assert found == pytest.approx(math.exp(-ratio * natural * time) * swing, abs=ROUNDING)
