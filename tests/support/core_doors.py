@@ -11,9 +11,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from support.kept import content_of, digest, kept
-from vibroimpact.fmus.packaging.build import BUILT, CORE_LIBRARY, NATIVE, is_current
+from vibroimpact.fmus.packaging.build import CORE_LIBRARY, NATIVE, is_current
 from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, compile_library
 from vibroimpact.fmus.packaging.platform_names import library_suffix
+from vibroimpact.fmus.shipped import package_folder
 
 DOORS = Path(__file__).with_name("doors")
 CORE = NATIVE / "core"
@@ -22,7 +23,8 @@ CORE = NATIVE / "core"
 @lru_cache(maxsize=1)
 def library_with_doors() -> ctypes.CDLL:
     """Return the library, loaded once."""
-    built = BUILT / f"{CORE_LIBRARY}{library_suffix()}"
+    # of the package that is imported: `python -m mutants` puts faults into another one's core
+    built = package_folder() / "built" / f"{CORE_LIBRARY}{library_suffix()}"
     # the core library exports all that the doors call; elsewhere a library is not linked to by its path
     is_linked = sys.platform == "linux" and is_current()
     core = [built] if is_linked else sorted(CORE.rglob("*.c"))
