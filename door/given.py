@@ -9,15 +9,16 @@ from typing import Any
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.file import text_of_tables
 from vibroimpact.orchestrator.ssp import opened_scene
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
 
 
-def given_scene(given: SceneLike) -> Scene:
-    """Return the scene that a caller means.
+def given_scene(given: SceneLike, *, for_orbits: bool = False) -> Scene:
+    """Return the scene that a caller means; for orbits a start that is not written may be on a stop.
 
     Raises
     ------
@@ -27,13 +28,15 @@ def given_scene(given: SceneLike) -> Scene:
     if isinstance(given, Scene):
         return given
     if isinstance(given, Mapping):
-        return Scene.from_dict(given)
+        if not for_orbits:
+            return Scene.from_dict(given)
+        return parse_scene(text_of_tables(given, "scene"), "scene", for_orbits=True)
     if isinstance(given, str) and "\n" in given:
         raise UsageError(
             "scene: expected the path of a file, got text of several lines. Scene.from_text reads it."
         )
     if isinstance(given, str | os.PathLike):
-        return opened_scene(given)
+        return opened_scene(given, for_orbits=for_orbits)
     raise UsageError(
         f"scene: expected a Scene, the path of one or its tables, got {type(given).__name__}. "
         "Scene.from_text reads TOML text."

@@ -74,7 +74,9 @@ def find_orbits(
     P(1,1) [1.884299] True
     P(1,1) [0.787422] False
     """
-    return orbits_of_scene(given_scene(scene), impacts, periods, seed=seed, penetrating=penetrating)
+    return orbits_of_scene(
+        given_scene(scene, for_orbits=True), impacts, periods, seed=seed, penetrating=penetrating
+    )
 
 
 def follow(
@@ -136,8 +138,8 @@ def follow(
     --------
     >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
     """
-    chosen = given_scene(scene)
-    alone = chosen.with_sweep({}) if chosen.sweep else chosen
+    chosen = given_scene(scene, for_orbits=True)
+    alone = chosen.unswept(varied=[parameter])
     if (second is None) != (second_range is None):
         raise UsageError("follow: second: expected a key and its range together, got one of them.")
     followed = follow_branches(

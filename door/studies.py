@@ -93,7 +93,7 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     """
     target = given_result(path)
     chosen = scene_with_modes(scene)
-    alone = chosen.with_sweep({}) if chosen.sweep else chosen
+    alone = chosen.unswept()
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
     if target is not None:
         write_results(dataset, target, kind="effects")

@@ -8,7 +8,7 @@ change is narrowed down to rounding by steps of part lengths.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,7 +22,6 @@ from vibroimpact.analysis.orbits.periodic import (
     OrbitError,
     PeriodicOrbit,
     evaluated,
-    ordered,
 )
 from vibroimpact.analysis.orbits.sign_changes import determinant, passes_doubling, turning, turns_round
 
@@ -37,6 +36,8 @@ STABILITY_CHANGE = "stability change"
 """Kind of a point where the stability changes for none of the reasons that are looked for, such as a branch point."""
 MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2}
 """Multipliers that pass the unit circle at a point of each kind."""
+CLOSED = "closed"
+"""End of a branch that comes back to its first orbit."""
 LOCATED = 1e-13
 """Width of a bracket, over the step along the branch, at which a point counts as found."""
 
@@ -154,6 +155,11 @@ class Branch:
         return self.orbits[0].orbit.full_name
 
     @property
+    def is_closed(self) -> bool:
+        """Whether its last orbit is its first again."""
+        return CLOSED in self.ends
+
+    @property
     def values(self) -> Floats:
         """The parameter of each orbit."""
         return np.array([each.value for each in self.orbits])
@@ -182,10 +188,19 @@ class Follower:
             The orbit does not lie on a branch.
         """
         ways = [Branch(origin), Branch(origin)]
-        for way, sign in zip(ways, (-1.0, 1.0), strict=True):
-            for _ in self.walk(way, orbit, value, sign):
-                pass
+        for _ in self.both_ways(ways[0], ways[1], orbit, value):
+            pass
         return joined(*ways)
+
+    def both_ways(
+        self, backward: Branch, forward: Branch, orbit: PeriodicOrbit, value: float
+    ) -> Iterator[tuple[Branch, BranchOrbit]]:
+        """Follow an orbit to lower values, then to higher ones; a closed branch is passed through once."""
+        for way, sign in ((backward, -1.0), (forward, 1.0)):
+            if backward.is_closed:
+                return
+            for each in self.walk(way, orbit, value, sign):
+                yield way, each
 
     def walk(self, branch: Branch, orbit: PeriodicOrbit, value: float, sign: float) -> Iterator[BranchOrbit]:
         """Follow one way, towards higher (+1) or lower (-1) values at first; the branch grows with each orbit."""
@@ -232,27 +247,38 @@ class Follower:
                 branch.orbits.append(taken)
                 yield taken
                 continue
-            for _, kind, at in self._events_in_order(now, taken, step):
-                if kind not in at.tests and kind != STABILITY_CHANGE:
-                    branch.ends.append(kind)
-                    if at is not now:
-                        branch.orbits.append(at)
-                        yield at
-                    return
-                branch.points.append(SpecialPoint(kind, at, len(branch.orbits)))
-                branch.orbits.append(at)
-                yield at
-                if kind.startswith("graze"):
-                    branch.ends.append(kind)
-                    return
+            home = self._home(branch.orbits[0], now, taken)
+            if home is not None:
+                step, taken = home
+            if (yield from self._passed(branch, now, taken, step)):
+                return
             branch.orbits.append(taken)
             yield taken
-            if _is_closed(branch, taken, longest):
-                branch.ends.append("closed")
+            if home is not None:
+                branch.ends.append(CLOSED)
                 return
             now = taken
             step = min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
         branch.ends.append(f"{self.settings.most_orbits} orbits")
+
+    def _passed(
+        self, branch: Branch, now: BranchOrbit, taken: BranchOrbit, step: float
+    ) -> Generator[BranchOrbit, None, bool]:
+        """Add what happens in a step to the branch; return whether the branch ends there."""
+        for _, kind, at in self._events_in_order(now, taken, step):
+            if kind not in at.tests and kind != STABILITY_CHANGE:
+                branch.ends.append(kind)
+                if at is not now:
+                    branch.orbits.append(at)
+                    yield at
+                return True
+            branch.points.append(SpecialPoint(kind, at, len(branch.orbits)))
+            branch.orbits.append(at)
+            yield at
+            if kind.startswith("graze"):
+                branch.ends.append(kind)
+                return True
+        return False
 
     # ---- one step ----
 
@@ -310,6 +336,33 @@ class Follower:
         if tangent @ now.tangent < np.cos(MOST_TURN):
             return None
         return BranchOrbit(float(value), orbit, tangent), newton
+
+    def _home(
+        self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit
+    ) -> tuple[float, BranchOrbit] | None:
+        """Return the step to the first orbit of the branch, and that orbit; None unless a step passes it."""
+        if now is first or taken is first:
+            return None
+        before, beyond = (self._apart(first, each) for each in (now, taken))
+        if not first.tangent @ before < 0.0 <= first.tangent @ beyond:
+            return None
+        farther = max(float(np.linalg.norm(each)) for each in (before, beyond))
+        if farther > 2.0 * float(np.linalg.norm(beyond - before)):
+            return None  # another part of the branch passes the same plane
+        step = float(now.tangent @ self._apart(now, first))
+        found = self._step(now, step) if step > 0.0 else None
+        return None if found is None else (step, found[0])
+
+    def _apart(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
+        """Return the way between two orbits in the unknowns of the branch, whatever turn each is counted from."""
+        whole = TURN * one.orbit.periods
+        turned = [
+            np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _alike(one, other)
+        ]
+        apart = [each - one.orbit.phases for each in turned]
+        apart = [each - TURN * np.round(each.mean() / TURN) for each in apart]
+        nearest = min(apart, key=lambda each: float(np.abs(each).max()))
+        return np.append(nearest, (other.value - one.value) / self.settings.span)
 
     # ---- what happens on the way ----
 
@@ -423,10 +476,7 @@ def joined(backward: Branch, forward: Branch) -> Branch:
     return Branch(forward.origin, turned + forward.orbits[1:], points, backward.ends + forward.ends)
 
 
-def _is_closed(branch: Branch, now: BranchOrbit, longest: float) -> bool:
-    if len(branch.orbits) < 10:
-        return False
-    first, span = branch.orbits[0], max(abs(branch.values - branch.orbits[0].value).max(), 1e-300)
-    apart = np.abs(ordered(now.orbit).phases - ordered(first.orbit).phases).max()
-    near = apart < 2.0 * longest and abs(now.value - first.value) < 2.0 * longest * span
-    return bool(near and now.tangent @ first.tangent > 0.9)
+def _alike(one: BranchOrbit, other: BranchOrbit) -> list[int]:
+    """Return the impacts of an orbit to count from so that its stops are in the order of another orbit."""
+    contacts = other.orbit.contacts
+    return [k for k in range(contacts.size) if (np.roll(contacts, -k) == one.orbit.contacts).all()]

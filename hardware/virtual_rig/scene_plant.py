@@ -101,10 +101,8 @@ def plant_scene(settings: RigSettings) -> Scene:
         raise UsageError(
             f"{settings.source}: rig.scene: expected an oscillator or a beam, got a scene of another kind."
         )
-    if scene.sweep:
-        scene = scene.with_sweep({})
     try:
-        return scene.with_values({"execution.impact_limit": MOST_IMPACTS_PER_POINT})
+        return scene.unswept().with_values({"execution.impact_limit": MOST_IMPACTS_PER_POINT})
     except SceneError as error:
         raise UsageError(f"{settings.source}: rig.scene: {error}") from None
 

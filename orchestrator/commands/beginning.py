@@ -63,7 +63,7 @@ class Beginning:
         if self.dataset is not None and given:
             raise UsageError(f"--from-dataset: expected it without {', '.join(given)}, which the run says.")
 
-    def begun(self, scene: Scene, changes: Sequence[str]) -> Begun:
+    def begun(self, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()) -> Begun:
         """Return the scene at the values of the run of the dataset, if there is one, and the seed.
 
         Parameters
@@ -72,6 +72,8 @@ class Beginning:
             Its sweep is left out.
         changes : sequence of str
             Which it was given, each KEY=VALUE.
+        varied : sequence of str
+            Keys that the command varies: values that the scene leaves to its sweep are not needed.
 
         Raises
         ------
@@ -80,9 +82,8 @@ class Beginning:
         DatasetError
             The run has no orbit.
         """
-        alone = scene.with_sweep({}) if scene.sweep else scene
         if self.dataset is None:
-            return Begun(alone, self.impacts, self.periods, self._impacts_of_seed())
+            return Begun(scene.unswept(varied), self.impacts, self.periods, self._impacts_of_seed())
         with open_dataset(self.dataset) as runs:
             try:
                 found = seed_of_run(runs, self.run)
@@ -92,6 +93,7 @@ class Beginning:
             raise UsageError(
                 f"--set {twice[0]}: expected another key than those the dataset sweeps, got one."
             )
+        alone = scene.unswept([*varied, *found.values])
         return Begun(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
 
     def _impacts_of_seed(self) -> Seed | None:

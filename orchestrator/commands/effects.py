@@ -40,7 +40,7 @@ def show_effects(
         lambda there: (there.get("results_kind"), there.get("scene_file")) == ("effects", str(path)),
     )
     scene = with_modes(opened)
-    alone = scene.with_sweep({}) if scene.sweep else scene
+    alone = scene.unswept()
     say(f"{engine(alone)}")
     shares = shares_of(alone, effects_of(alone))
     rows = table(

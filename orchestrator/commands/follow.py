@@ -76,7 +76,7 @@ def show_branches(
     """
     wanted.refuse()
     refuse_outputs([path, *wanted.beginning.files], output, figure)
-    begun = wanted.beginning.begun(opened_scene(path, changes), changes)
+    begun = wanted.beginning.begun(opened_scene(path, changes, for_orbits=True), changes, [wanted.parameter])
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
     followed = Followed(begun.scene, wanted.parameter)
     loci = FollowedLoci(followed, wanted.second or "")

@@ -53,7 +53,7 @@ def show_orbits(
     """Find orbits, print them, and write and draw them where that was asked for."""
     wanted.beginning.refuse()
     refuse_outputs([path, *wanted.beginning.files], output, figure)
-    found = wanted.beginning.begun(opened_scene(path, changes), changes)
+    found = wanted.beginning.begun(opened_scene(path, changes, for_orbits=True), changes)
     scene = found.scene
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
     orbits = find_orbits(scene, found.impacts, found.periods, seed=found.seed, penetrating=wanted.penetrating)
@@ -84,7 +84,7 @@ def _write(scene: Scene, physical: Sequence[PeriodicOrbit], output: Path | None)
     if not physical:
         say(f"{output} is not written: it would hold no orbit.")
         return
-    attrs = scene_attributes(scene.with_sweep({}) if scene.sweep else scene, HISTORY)
+    attrs = scene_attributes(scene.unswept(), HISTORY)
     write_dataset(dataset_of_orbits(physical, units=scene.units, attrs=attrs), output)
     say(f"Dataset written to {output}.")
 

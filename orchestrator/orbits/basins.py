@@ -133,7 +133,7 @@ def prepare_basins(scene: Scene, plane: Plane) -> tuple[Scene, Floats, Floats, B
         The scene has no orbits, or the plane no starts.
     """
     plane.refuse()
-    alone = scene.with_sweep({}) if scene.sweep else scene
+    alone = scene.unswept()
     body = impacting_body(alone)
     _axes(alone, plane.number)
     spans, scale = _spans(alone, body, plane)

@@ -182,7 +182,7 @@ def control_plan(scene: Scene, start: float, stop: float, settings: ControlSetti
         There is none at the start.
     """
     settings.refuse()
-    alone = scene.with_sweep({}) if scene.sweep else scene
+    alone = scene.unswept(varied=["forcing.angular_frequency"])
     if not isinstance(alone.body, OscillatorBody):
         raise UsageError(
             f"{scene.source}: body.kind: expected an oscillator, whose state an impact tells, got another body."

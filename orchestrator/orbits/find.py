@@ -51,7 +51,7 @@ def find_orbits(
     OrbitError
         There is no orbit near to the seed.
     """
-    alone = scene.with_sweep({}) if scene.sweep else scene
+    alone = scene.unswept()
     body = impacting_body(alone)
     if seed is not None:
         return [_of_seed(body, seed, impacts, 1 if periods is None else periods)]

@@ -62,7 +62,7 @@ def first_orbits(
         yield from _of_many_impacts(body_at, scene, parameter, settings, impacts, periods, looking)
 
 
-def _values(settings: FollowSettings) -> list[float]:
+def seed_values(settings: FollowSettings) -> list[float]:
     """Return values of the parameter at which orbits are looked for."""
     return [float(each) for each in np.linspace(settings.lowest, settings.highest, SEEDS + 2)[1:-1]]
 
@@ -70,7 +70,7 @@ def _values(settings: FollowSettings) -> list[float]:
 def _of_one_impact(
     body_at: BodyAt, settings: FollowSettings, periods: int
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
-    for value in _values(settings):
+    for value in seed_values(settings):
         body = body_at(value)
         for contact in range(len(body.contacts)):
             try:
@@ -92,7 +92,7 @@ def _of_many_impacts(
     """Return orbits at values of the range, first at the scene's own: a branch may lie between the others."""
     own = float(scene.value(parameter))
     inside = [own] if settings.lowest <= own <= settings.highest else []
-    for value in [*inside, *_values(settings)]:
+    for value in [*inside, *seed_values(settings)]:
         looking(value)
         yield from ((value, orbit) for orbit in orbits_of(body_at(value), impacts, periods))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,10 +24,12 @@ from vibroimpact.analysis.orbits.following import (
 )
 from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits
+from vibroimpact.orchestrator.orbits.find import orbit_of_run
+from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene import Scene
@@ -270,10 +273,33 @@ def follow_branches(
     if not result.branches:
         raise OrbitError(
             f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of {parameter} "
-            f"from {settings.lowest:g} to {settings.highest:g}, got none. Try another range, or other periods."
+            f"from {settings.lowest:g} to {settings.highest:g}, got none. "
+            + _other_orbits(scene, parameter, settings, (impacts or 1, periods))
         )
     _doubled(follower, result, doublings, told)
     return result
+
+
+def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought: tuple[int, int]) -> str:
+    """Return what to do where there is no orbit of some impacts and periods: what runs in the range end on says it."""
+    runs = [_orbit_of_run_at(scene, parameter, value) for value in seed_values(settings)]
+    ends = Counter((orbit.phases.size, orbit.periods) for orbit in runs if orbit is not None)
+    ends.pop(sought, None)
+    if not ends:
+        return "Try another range, or other impacts and periods: no run at these values ends on an orbit."
+    (impacts, periods), count = ends.most_common(1)[0]
+    asked = typed_or_called(
+        f"--impacts {impacts} --periods {periods}", f"impacts={impacts}, periods={periods}"
+    )
+    return f"Try {asked}: runs at {count} of these values end on P({impacts},{periods})."
+
+
+def _orbit_of_run_at(scene: Scene, parameter: str, value: float) -> PeriodicOrbit | None:
+    """Return the orbit that a run ends on at a value of the parameter; None where the scene has no run there."""
+    try:
+        return orbit_of_run(scene.with_values({parameter: value}))
+    except SceneError:
+        return None
 
 
 def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed, told: Told) -> None:
@@ -281,9 +307,8 @@ def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: F
     origin = f"{orbit.full_name} at {value:g}"
     ways = Branch(origin), Branch(origin)
     try:
-        for way, sign in zip(ways, (-1.0, 1.0), strict=True):
-            for each in follower.walk(way, orbit, value, sign):
-                told(way, each)
+        for way, each in follower.both_ways(*ways, orbit, value):
+            told(way, each)
     finally:
         backward, forward = ways
         if backward.orbits:

@@ -137,7 +137,7 @@ def map_of(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
 def _needed(scene: Scene | None, settings: MapSettings) -> Scene:
     if scene is None:
         raise UsageError(f"maps: scene: expected one for the kind {settings.kind}, got none.")
-    return scene.with_sweep({}) if scene.sweep else scene
+    return scene.unswept()
 
 
 # ---- of a scene's impacts ----

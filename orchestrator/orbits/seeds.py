@@ -57,7 +57,7 @@ def seed_of_run(dataset: xr.Dataset | str | PathLike[str], run: int | None = Non
     Examples
     --------
     >>> near = seed_of_run("sweep.nc", 12)                     # doctest: +SKIP
-    >>> scene = scene.with_sweep({}).with_values(near.values)  # doctest: +SKIP
+    >>> scene = scene.unswept(near.values).with_values(near.values)  # doctest: +SKIP
     >>> vi.follow(scene, "forcing.amplitude", 0.3, 0.6, seed=near.impacts, periods=near.periods)  # doctest: +SKIP
     """
     if not isinstance(dataset, xr.Dataset):

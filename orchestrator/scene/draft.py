@@ -97,7 +97,7 @@ class Draft(DraftTables):
     """
 
     def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
-        super().__init__(_with_swept_keys(document, axes))
+        super().__init__(with_swept_keys(document, axes))
         self.axes = axes
         self.body: Body | None = self._body()
         self.forcing = self.table(Forcing, "forcing")
@@ -175,7 +175,7 @@ class Draft(DraftTables):
         return span and (2.0 * math.pi * span[0], 2.0 * math.pi * span[1])
 
 
-def _with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
+def with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
     """Return the document with the first swept value wherever the swept key itself is not written.
 
     Of modes it has the least number, written or not: what names modes is to suit each of the swept numbers.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -118,6 +118,31 @@ def number_of(owner: object, key: Key) -> float | None:
         array = isinstance(value, tuple) and key.element < len(value)
         return float(value[key.element]) if array and value is not None else None
     return float(value) if isinstance(value, int | float) else None
+
+
+def is_missing(document: Mapping[str, Any], text: str) -> bool:
+    """Return whether a document of the short form has no number at a numeric key, and none that says the same."""
+    key = parse_key(text)
+    if key is None:
+        return False
+    try:
+        owner = key.owner_in(document)
+    except (KeyError, IndexError):
+        return True
+    return isinstance(owner, Mapping) and not {key.name, ALTERNATIVES.get(key.name)} & owner.keys()
+
+
+def with_alternatives(texts: Iterable[str]) -> set[str]:
+    """Return keys, and the keys of the same tables that say the same things.
+
+    Examples
+    --------
+    >>> sorted(with_alternatives(["forcing.frequency"]))
+    ['forcing.angular_frequency', 'forcing.frequency']
+    """
+    keys = set(texts)
+    parts = [each.rpartition(".") for each in keys]
+    return keys | {f"{table}.{ALTERNATIVES[name]}" for table, _, name in parts if name in ALTERNATIVES}
 
 
 def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:

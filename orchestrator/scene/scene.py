@@ -7,7 +7,7 @@ The keys are described in `docs/scene.md`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import chain
 from os import PathLike
@@ -19,8 +19,10 @@ from pydantic import BaseModel, Field, field_serializer
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.scene.body_models import Body
 from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
+from vibroimpact.orchestrator.scene.draft import with_swept_keys
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
 from vibroimpact.orchestrator.scene.file import (
     parse_scene_toml,
@@ -33,10 +35,12 @@ from vibroimpact.orchestrator.scene.keys import (
     SINGLE_TABLES,
     Key,
     coordinate_name,
+    is_missing,
     number_of,
     numbers_of,
     numeric_key,
     replacement,
+    with_alternatives,
 )
 from vibroimpact.orchestrator.scene.measuring_models import (
     Daq,
@@ -49,6 +53,7 @@ from vibroimpact.orchestrator.scene.measuring_models import (
 from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Stop
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
+from vibroimpact.orchestrator.scene.resting_start import with_resting_start
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 from vibroimpact.orchestrator.scene.tables import read_tables
 
@@ -360,6 +365,50 @@ class Scene(SceneTable):
         document.pop("sweep", None)
         return self.from_dict(document | ({"sweep": tables} if tables else {}), self.source)
 
+    def unswept(self, varied: Iterable[str] = ()) -> Scene:
+        """Return this scene without its sweep.
+
+        Parameters
+        ----------
+        varied : iterable of str
+            Keys that the caller varies. Where the file leaves one of them to the sweep, it has the first swept value.
+
+        Raises
+        ------
+        SceneError
+            Another swept key has no value of its own, and needs one.
+
+        Examples
+        --------
+        >>> text = "[body]\\nmass = 1\\n[record]\\nrecorded_time = 5\\n[sweep]\\n'body.stiffness' = { values = [1, 4] }"
+        >>> Scene.from_text(text).unswept(varied=["body.stiffness"]).value("body.stiffness")
+        1.0
+        """
+        if not self.sweep:
+            return self
+        document = parse_scene_toml(self.text, self.source)
+        document.pop("sweep", None)
+        keys = with_alternatives(varied)
+        if self.general is None:
+            axes = [axis for axis in self.sweep if axis.key != RECORDING_KEY]
+            document = with_swept_keys(document, tuple(axis for axis in axes if axis.key in keys))
+        try:
+            return self.from_dict(document, self.source)
+        except SceneError as error:
+            lines = [self._left_to_the_sweep(axis) for axis in self.sweep if is_missing(document, axis.key)]
+            raise SceneError(lines) if lines else error from error
+
+    def _left_to_the_sweep(self, axis: SweepAxis) -> str:
+        value = f"{axis.values[0]:g}"
+        give = typed_or_called(
+            f"--set 'sweep={{}}' --set '{axis.key}={value}'",
+            f'with_values({{"sweep": {{}}, "{axis.key}": {value}}})',
+        )
+        return (
+            f"{self.source}: {axis.key}: expected a value beside those of the sweep, which is left out here, got none. "
+            f"Add it to the scene, or give it: {give}."
+        )
+
     def to_toml(self) -> str:
         """Return the text of a scene file that says the same; that of `from_file`, comments and all."""
         return self.text
@@ -385,7 +434,7 @@ class Scene(SceneTable):
         return {**stops, **tables, "execution": self.execution}
 
 
-def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
+def load_scene(path: str | PathLike[str], changes: Sequence[str] = (), *, for_orbits: bool = False) -> Scene:
     """Read a scene file.
 
     Parameters
@@ -394,6 +443,8 @@ def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
         A TOML file, UTF-8, at most 1 MiB.
     changes : sequence of str
         `KEY=VALUE`, made before anything is checked: see `changes.changed_document`.
+    for_orbits : bool
+        Whether a start that is not written may be on a stop: see `parse_scene`.
 
     Raises
     ------
@@ -401,10 +452,10 @@ def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
         With all problems of the file, each on one line.
     """
     source = str(path)
-    return parse_scene(read_scene_text(Path(path), source), source, changes)
+    return parse_scene(read_scene_text(Path(path), source), source, changes, for_orbits=for_orbits)
 
 
-def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
+def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbits: bool = False) -> Scene:
     """Read a scene from TOML text.
 
     Parameters
@@ -415,16 +466,20 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
         The name of the text in messages, usually its file.
     changes : sequence of str
         `KEY=VALUE`; the text of the scene is then one that says the same as the changed tables.
+    for_orbits : bool
+        Whether the scene is read to look for periodic orbits, which need no start: a start that is not written is then
+        on the stop where a stop excludes 0.
 
     Raises
     ------
     SceneError
         With all problems of the text, each on one line.
     """
-    document, changed = changed_document(parse_scene_toml(text, source), changes)
+    written, changed = changed_document(parse_scene_toml(text, source), changes)
+    document = with_resting_start(written) if for_orbits else written
     fields, problems = read_tables(document, Path(source).parent)
     if problems:
         raise SceneError(lines_of(problems, source, changed))
-    if changed:
+    if changed or document != written:
         text = tomli_w.dumps(document)
     return Scene(source=source, text=text, **fields)

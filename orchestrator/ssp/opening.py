@@ -13,7 +13,9 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 ENDING = ".ssp"
 
 
-def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
+def opened_scene(
+    path: str | PathLike[str], changes: Sequence[str] = (), *, for_orbits: bool = False
+) -> Scene:
     """Return the scene of a file; what a system leaves open is said on standard error.
 
     The FMUs of a system lie unpacked until this process ends.
@@ -24,6 +26,8 @@ def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scen
         A scene file (TOML), or a system, whose name ends in `.ssp`.
     changes : sequence of str
         `KEY=VALUE`, made before anything is checked.
+    for_orbits : bool
+        Whether a start that is not written may be on a stop: see `scene.parse_scene`.
 
     Raises
     ------
@@ -33,7 +37,7 @@ def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scen
         The archive, or an FMU in it, is unsafe or damaged.
     """
     if not is_system(path):
-        return load_scene(path, changes)
+        return load_scene(path, changes, for_orbits=for_orbits)
     from vibroimpact.orchestrator.ssp.importing import load_system
 
     imported = load_system(path, changes)

@@ -145,7 +145,7 @@ def studied_scene(scene: Scene) -> Scene:
     UsageError
         The scene has an exciter whose force is not its forcing alone.
     """
-    alone = scene.with_sweep({}) if scene.sweep else scene
+    alone = scene.unswept()
     if scene.general is not None or scene.replay is not None:
         return alone
     alone = motion_alone(alone)

@@ -41,7 +41,7 @@ class SweepPlaces:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._alone = scene.with_sweep({}) if scene.sweep else scene
+        self._alone = scene.unswept(varied=[axis.key for axis in scene.sweep])
         self._dimensions = dimensions([axis for axis in scene.sweep if axis.key != RECORDING_KEY])
         self.shape = tuple(len(members[0].values) for members in self._dimensions)
 

@@ -100,3 +100,27 @@ def test_a_point_moves_as_many_multipliers_as_its_kind(branch: Branch) -> None:
     assert not is_explained(stable, unstable, ["fold", "fold"])
     for kinds in (["fold"], ["period doubling"], ["fold", "torus"], ["graze"]):
         assert is_explained(stable, unstable, kinds)
+
+
+def lightly_damped(frequency: float) -> ImpactingBody:
+    one = np.ones(1)
+    return ImpactingBody(
+        one, 0.02 * one, 0.5 * one, 0.0 * one, frequency, 0.0, (Contact(one, 1.0, 1.0, 0.8),), one
+    )
+
+
+@pytest.mark.parametrize("start", [2.2, 2.5, 2.63])
+@pytest.mark.parametrize("longest", [0.01, 0.05])
+def test_a_closed_branch_is_passed_through_once_from_any_of_its_orbits(start: float, longest: float) -> None:
+    follower = Follower(lightly_damped, FollowSettings(2.0, 2.8, longest=longest))
+    for orbit in closed_form(lightly_damped(start), 2):
+        branch = follower.branch(orbit, start)
+        assert branch.ends == ["closed"]
+        assert [point.kind for point in branch.points] == ["fold", "fold"]
+        for point in branch.points:  # two orbits on one side of a fold, none on the other
+            inwards = 1e-7 * np.sign(2.4 - point.at.value)
+            assert len(closed_form(lightly_damped(point.at.value + inwards), 2)) == 2
+            assert not closed_form(lightly_damped(point.at.value - inwards), 2)
+        first, last = branch.orbits[0], branch.orbits[-1]
+        assert last.value == pytest.approx(first.value, abs=1e-10)
+        assert last.orbit.velocities == pytest.approx(first.orbit.velocities, abs=1e-9)

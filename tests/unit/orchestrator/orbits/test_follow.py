@@ -14,6 +14,8 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.search import orbits_of
+from vibroimpact.fmus.errors import DatasetError, SceneError
+from vibroimpact.orchestrator.scene.resting_start import with_resting_start
 
 
 def in_this_process(arguments: list[str]) -> tuple[int, str, str]:
@@ -430,3 +432,108 @@ def test_an_orbit_that_passes_through_its_stop_is_not_followed() -> None:
     (orbit,) = vi.find_orbits(scene, 1, 2, penetrating=True)
     with pytest.raises(OrbitError, match=r"got a P\(1,2\) that passes through stop 1 by 0.00339"):
         vi.follow(scene, PARAMETER, 0.8, 0.9, seed=[(float(orbit.phases[0]), 1)], periods=2)
+
+
+def swept_scene(**forcing: float) -> dict[str, object]:
+    """Return a two-sided oscillator that sweeps its frequency, which it does not give."""
+    stop = {"position": 1.0, "restitution": 0.7}
+    return {
+        "scene": {"units": "nondimensional"},
+        "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.04},
+        "forcing": {"amplitude": 0.5, **forcing},
+        "stop": [stop, {**stop, "side": "lower", "position": -1.0}],
+        "record": {"recorded_periods": 8},
+        "sweep": {PARAMETER: {"start": 0.95, "stop": 1.3, "points": 4}},
+    }
+
+
+def test_a_key_that_the_scene_leaves_to_its_sweep_is_followed() -> None:
+    left, given = swept_scene(), swept_scene(angular_frequency=1.1)
+    found = [vi.follow(scene, PARAMETER, 0.95, 1.0, step=0.2, doublings=0) for scene in (left, given)]
+    np.testing.assert_array_equal(*(each.impact_velocity.values for each in found))
+    assert "sweep" not in vi.Scene.from_text(found[0].attrs["scene"]).to_toml()
+
+
+def test_another_key_that_is_left_to_the_sweep_is_asked_for_with_what_to_write(tmp_path: Path) -> None:
+    file = tmp_path / "swept.toml"
+    file.write_text(vi.Scene.from_dict(swept_scene()).to_toml(), encoding="utf-8")
+    for command in (
+        ["follow", str(file), "--parameter", "forcing.amplitude", "--from", "0.3", "--to", "0.5"],
+        ["orbit", str(file)],
+        ["maps", str(file)],
+    ):
+        code, _, err = in_this_process(command)
+        assert code == 2
+        assert err == (
+            f"{file}: {PARAMETER}: expected a value beside those of the sweep, which is left out here, got none. "
+            f"Add it to the scene, or give it: --set 'sweep={{}}' --set '{PARAMETER}=0.95'.\n"
+        )
+        assert (
+            in_this_process([*command[:2], "--set", "sweep={}", "--set", f"{PARAMETER}=0.95", "--help"])[0]
+            == 0
+        )
+
+
+def test_orbits_of_a_stop_that_keeps_the_body_from_0_need_no_start(tmp_path: Path) -> None:
+    scene = swept_scene(angular_frequency=1.1) | {"stop": [{"position": -0.1, "restitution": 0.7}]}
+    scene.pop("sweep")
+    written = scene | {"body": scene["body"] | {"displacement_start": -5.0}}  # type: ignore[operator]
+    for found, expected in zip(vi.find_orbits(scene, 1), vi.find_orbits(written, 1), strict=True):
+        np.testing.assert_array_equal(found.phases, expected.phases)
+    branch = vi.follow(scene, PARAMETER, 1.0, 1.2, step=0.2, doublings=0)
+    assert vi.Scene.from_text(branch.attrs["scene"]).value("body.displacement_start") == -0.1
+    with pytest.raises(SceneError, match="a start on the free side of stop"):
+        vi.run(scene)
+    file = tmp_path / "below.toml"
+    file.write_text(branch.attrs["scene"].replace("displacement_start = -0.1", ""), encoding="utf-8")
+    assert in_this_process(["orbit", str(file), "--impacts", "1"])[0] == 0
+
+
+def test_a_chain_whose_stops_exclude_0_is_searched_from_its_stops() -> None:
+    chain = {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": [1.0, 1.0], "dampings": 0.1}
+    document = {"body": chain, "stop": [{"position": -0.2}, {"position": 0.3, "side": "lower", "mass": 1}]}
+    assert with_resting_start(document)["body"]["displacement_start"] == [0.3, -0.2]
+    swept = {"stop[1].position": {"values": [-0.4, 0.1]}}
+    assert with_resting_start(document | {"sweep": swept})["body"]["displacement_start"] == [0.3, -0.4]
+    assert with_resting_start({"body": chain, "stop": [{"position": 0.0}]})["body"] == chain
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {},
+        {"body": 3},
+        {"body": {}, "stop": 7},
+        {"body": {}, "stop": [{"position": "a"}, 4]},
+        {"body": {"kind": []}},
+    ],
+)
+def test_a_scene_of_any_content_is_left_to_its_rules(document: dict[str, object]) -> None:
+    assert with_resting_start(document) == document
+
+
+def test_without_an_orbit_of_one_impact_the_number_of_impacts_is_named() -> None:
+    scene = swept_scene(angular_frequency=1.1)
+    scene |= {"stop": [{**stop, "position": 0.5 * stop["position"]} for stop in scene["stop"]]}  # type: ignore[attr-defined]
+    with pytest.raises(
+        OrbitError,
+        match=r"got none\. Try impacts=2, periods=1: runs at \d+ of these values end on P\(2,1\)\.",
+    ):
+        vi.follow(scene, PARAMETER, 1.0, 2.0)
+
+
+@pytest.mark.parametrize("variable", ["displacement_max", "strobe_displacement", "impact_phase"])
+def test_branches_over_a_sweep_draw_the_variable_that_is_asked_for(branches: object, variable: str) -> None:
+    sweep = vi.run(vi.Scene.from_file(SCENE).with_sweep({PARAMETER: [1.0, 1.2, 1.4]}), progress=False)
+    figure = vi.draw(branches, over=sweep, variable=variable)  # type: ignore[arg-type]
+    (axis,) = figure.axes
+    below, *lines = axis.lines
+    assert below.get_label() == "simulated"
+    values = sweep[variable].values.ravel()
+    np.testing.assert_array_equal(
+        np.sort(np.asarray(below.get_ydata())), np.sort(values[np.isfinite(values)])
+    )
+    drawn = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in lines])
+    assert np.isfinite(drawn).sum() > 3 * below.get_ydata().size
+    with pytest.raises(DatasetError, match="expected one that orbits recorded"):
+        vi.draw(branches, over=sweep, variable="nothing")  # type: ignore[arg-type]
