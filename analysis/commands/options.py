@@ -63,6 +63,14 @@ def plot(
     segment: Annotated[
         int | None, typer.Option(help="Of a density: samples of a segment, a power of two; else 1024.")
     ] = None,
+    variable: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a bifurcation diagram or branches: what is drawn, such as displacement_max, strobe_displacement, "
+            "impact_phase.",
+            metavar="NAME",
+        ),
+    ] = None,
     title: Annotated[str | None, typer.Option(help='Title above the figure; "" for none.')] = None,
     width: Annotated[float | None, typer.Option(help="Width of the figure, mm; else one column, 85.")] = None,
     height: Annotated[float | None, typer.Option(help="Height of the figure, mm.")] = None,
@@ -76,7 +84,7 @@ def plot(
     from vibroimpact.analysis.commands.plot import draw_file
 
     options: dict[str, Any] = {"recording": recording, "start": start, "stop": stop, "periods": periods}
-    options |= {"segment": segment, "title": title, "width": width, "height": height}
+    options |= {"segment": segment, "variable": variable, "title": title, "width": width, "height": height}
     draw_file(file, output, kind, run, options, over)
 
 

@@ -52,6 +52,7 @@ def draw(
     periods: float | None = None,
     over: xr.Dataset | None = None,
     segment: int | None = None,
+    variable: str | None = None,
     title: str | None = None,
     width: float | None = None,
     height: float | None = None,
@@ -79,6 +80,9 @@ def draw(
         Another sweep of the same parameter, drawn below this one: a measured sweep over the simulated one.
     segment : int, optional
         Of a density: samples of a segment, a power of two.
+    variable : str, optional
+        Of a bifurcation diagram and of branches: what is drawn over the swept parameter, such as `displacement_max`,
+        `strobe_displacement` or `impact_phase`. Default: displacement range and impact velocity.
     title : str, optional
         Above the figure. Default: none, as journals want it; of a ladder that of its dataset. "" is none.
     width, height : float, optional
@@ -100,7 +104,7 @@ def draw(
     >>> dataset = open_dataset("campaign")                                             # doctest: +SKIP
     >>> save(draw(dataset, "strobe", run=3, width=120.0), "section.pdf")               # doctest: +SKIP
     """
-    view = View(run, recording, Window(start, stop, periods), over, segment)
+    view = View(run, recording, Window(start, stop, periods), over, segment, variable)
     with page_style():
         return laid_out(draw_view(data, kind, view), title, width, height)
 
@@ -120,6 +124,7 @@ def draw_into(
     periods: float | None = None,
     over: xr.Dataset | None = None,
     segment: int | None = None,
+    variable: str | None = None,
 ) -> T:
     """Draw into axes that there are already, in the style that they have, and return them.
 
@@ -127,7 +132,7 @@ def draw_into(
     ----------
     axes : Axes, or sequence or array of Axes
         As many as the figure has panels, row by row.
-    data, kind, run, recording, start, stop, periods, over, segment
+    data, kind, run, recording, start, stop, periods, over, segment, variable
         See `draw`.
 
     Raises
@@ -148,5 +153,5 @@ def draw_into(
             f"figure: axes: expected axes of matplotlib, got {type(axes).__name__}. Make some: plt.subplots()."
         )
     with drawing_into(given):
-        draw_view(data, kind, View(run, recording, Window(start, stop, periods), over, segment))
+        draw_view(data, kind, View(run, recording, Window(start, stop, periods), over, segment, variable))
     return axes

@@ -107,7 +107,7 @@ class FigureKind:
     fits : callable
         Whether a dataset of runs holds what the figure shows.
     takes : tuple of str
-        Options: `run`, `recording`, `window`, `over`, `segment`.
+        Options: `run`, `recording`, `window`, `over`, `segment`, `variable`.
     """
 
     families: dict[Family, Callable[[Any, View], Figure]]
@@ -128,21 +128,27 @@ def _has_phases(dataset: xr.Dataset) -> bool:
     return "impact_phase" in dataset and bool(np.isfinite(dataset["impact_phase"].values).any())
 
 
-def _draw_sweep(dataset: xr.Dataset, over: xr.Dataset | None) -> Figure:
-    if over is None and "measurement_flags" not in dataset:
-        return draw_bifurcation(dataset)
-    return draw_measured_sweep(dataset, over)
+def _draw_sweep(dataset: xr.Dataset, view: View) -> Figure:
+    if view.over is None and "measurement_flags" not in dataset:
+        return draw_bifurcation(dataset, view.variable)
+    if view.variable is not None:
+        raise UsageError(
+            "figure: variable: expected none for a measured sweep, which has its displacement range, got one."
+        )
+    return draw_measured_sweep(dataset, view.over)
 
 
 _SINGLE = ("run", "window")
 KINDS: dict[str, FigureKind] = {
     "bifurcation": FigureKind(
-        {"runs": lambda data, view: _draw_sweep(data, view.over)},
+        {"runs": _draw_sweep},
         lambda data: _swept(data, 1, "displacement_range", "impact_velocity"),
-        ("over",),
+        ("over", "variable"),
     ),
     "branches": FigureKind(
-        {"runs": lambda data, view: draw_branches(data, view.over)}, lambda data: BRANCH in data, ("over",)
+        {"runs": lambda data, view: draw_branches(data, view.over, view.variable)},
+        lambda data: BRANCH in data,
+        ("over", "variable"),
     ),
     "classes": FigureKind({"runs": lambda data, view: draw_classes(data)}, lambda data: CLASS_KIND in data),
     "map": FigureKind(
@@ -323,6 +329,7 @@ def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
         ("window", view.window.given, False),
         ("over", view.over is not None, family not in ("runs", "control")),
         ("segment", view.segment is not None, False),
+        ("variable", view.variable is not None, family != "runs"),
     ):
         if not is_given or (name in KINDS[kind].takes and not is_foreign):
             continue

@@ -105,3 +105,4 @@ class View(NamedTuple):
     window: Window
     over: xr.Dataset | None = None
     segment: int | None = None
+    variable: str | None = None

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.dataset.schema import scene_of
+from vibroimpact.analysis.figures.motion.layers import FEW_TURNS, draw_layers, draw_turns, turn_begins
 from vibroimpact.analysis.figures.motion.series import (
     first_after_impacts,
     impacts_within,
@@ -41,8 +42,6 @@ _PANEL_MM = 62
 _DOT = 1.1
 # Impacts on one stop above which they are as small.
 _MANY = 200
-# Samples of one motion: about a hundred periods.
-_LONG = 20_000
 _QUARTERS = ("0", "π/2", "π", "3π/2", "2π")
 
 
@@ -90,17 +89,18 @@ def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
-    """Draw one line, broken where the velocity jumps; a long one is thin and faint, so that its layers show."""
-    long = {"linewidth": 0.3, "alpha": 0.5} if orbit.displacement.size > _LONG else {}
-    broken = [with_gaps(values, jumps) for values in (orbit.displacement, orbit.velocity)]
-    axis.plot(*broken, color=colour, label=orbit.words, rasterized=True, **long)
-    joined = [_joined(values, jumps) for values in (orbit.displacement, orbit.velocity)]
-    axis.plot(*joined, color=colour, linestyle=":", **({"linewidth": 0.6} | long), rasterized=True)
-
-
-def _joined(values: Floats, jumps: Any) -> Floats:
-    """Return the values before and after each jump, with a gap after each pair, as one line."""
-    return np.stack([values[jumps - 1], values[jumps], np.full(jumps.size, np.nan)], axis=1).ravel()
+    """Draw one line, broken where the velocity jumps; the turns of a long one are layers."""
+    x, y = (with_gaps(values, jumps) for values in (orbit.displacement, orbit.velocity))
+    draw_turns(axis, x, y, color=colour, label=orbit.words, rasterized=True)
+    style = {"color": colour, "linestyle": ":", "rasterized": True}
+    both = [np.stack([values[jumps - 1], values[jumps]], axis=1) for values in orbit[2:]]
+    pairs = np.stack(both, axis=2)
+    if turn_begins(orbit.velocity).size > FEW_TURNS:
+        draw_layers(axis, pairs, **style)
+        return
+    gaps = np.full((jumps.size, 1, 2), np.nan)
+    joined = np.concatenate([pairs, gaps], axis=1).reshape(-1, 2)
+    axis.plot(joined[:, 0], joined[:, 1], linewidth=0.6, **style)
 
 
 def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:

@@ -11,9 +11,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vibroimpact.analysis.figures.motion.series import draw_series, sampled_variables, selected, time_part
+from vibroimpact.analysis.figures.motion.layers import draw_turns
+from vibroimpact.analysis.figures.motion.series import (
+    count_time,
+    draw_series,
+    sampled_variables,
+    selected,
+    time_part,
+)
 from vibroimpact.analysis.figures.motion.strobe import draw_section
 from vibroimpact.analysis.figures.page import (
+    COLOURS,
     LINE,
     MARK,
     STOP_LINE,
@@ -68,7 +76,8 @@ def _draw_samples(dataset: xr.Dataset, view: View) -> Figure:
     for axis, columns in ((above, (0, 1)), (middle, (0, 2)), (below, (1, 2))):
         shown = part if axis is not below or view.window.given else (-math.inf, math.inf)
         rows, inside = _with_impacts(samples, marks, shown)
-        axis.plot(rows[:, columns[0]], rows[:, columns[1]], color=LINE, rasterized=True)
+        drawn = draw_turns if axis is below else Axes.plot
+        drawn(axis, rows[:, columns[0]], rows[:, columns[1]], color=LINE, rasterized=True)
         size = 2.2 if len(inside) <= _MOST_LARGE_MARKS else 0.8
         axis.plot(inside[:, columns[0]], inside[:, columns[1]], markersize=size, label=words_of_marks, **dots)
     for position in sorted({stop.position for stop in observed_stops(dataset)}):
@@ -78,9 +87,7 @@ def _draw_samples(dataset: xr.Dataset, view: View) -> Figure:
     above.tick_params(labelbottom=False)
     above.set_ylabel(label(samples["displacement"]))
     middle.set_ylabel(label(samples["velocity"]))
-    middle.set_xlabel(label(samples["time"]) + words)
-    # long numbers of late instants and of small displacements would run together
-    middle.xaxis.set_major_locator(MaxNLocator(6))
+    count_time(middle, samples["time"], view.window, words)
     below.xaxis.set_major_locator(MaxNLocator(5))
     below.set(xlabel=label(samples["displacement"]), ylabel=label(samples["velocity"]))
     legend_outside(figure, below, ncols=2)
@@ -152,6 +159,14 @@ def _draw_extremes(axis: Axes, run: xr.Dataset, observed: list[ShownStop]) -> No
 
 def _draw_impacts(axis: Axes, hits: xr.Dataset) -> None:
     """Draw the velocity of each impact against time."""
-    axis.plot(hits["impact_time"].values, hits["impact_velocity"].values, "o", color=MARK, markersize=2)
+    owner = hits["impact_contact"].values
+    hit = np.unique(owner)
+    for place, stop in enumerate(hit):
+        one = hits.isel(impact=owner == stop)
+        colour = COLOURS[place % len(COLOURS)] if hit.size > 1 else MARK
+        dots = one["impact_time"].values, one["impact_velocity"].values
+        axis.plot(*dots, "o", color=colour, markersize=2, label=f"stop {stop:g}")
+    if hit.size > 1:
+        legend_above(axis, "center")
     axis.set(xlabel=label(hits["impact_time"].rename("time")), ylabel=label(hits["impact_velocity"]))
     axis.set_ylim(0.0, 1.05 * float(hits["impact_velocity"].max()) if hits.sizes["impact"] else 1.0)

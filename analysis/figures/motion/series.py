@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.analysis.figures.page import (
@@ -42,6 +42,8 @@ _MOST_LINES, _TICKS_FROM = 25, 0.94
 # What tells variables of one quantity apart: contact_displacement_1, displacement_2; energy_kinetic, energy_potential.
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
 _CONTACT_FORCE = re.compile(r"contact_force(?:_([0-9]+))?$")
+# First instant, over the width of the panel, above which time counts from it.
+_LATE = 2.0
 # What happens at an instant, and the variable with its times.
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
@@ -81,8 +83,7 @@ def draw_series(dataset: xr.Dataset, view: View) -> Figure:
         # What the marks are is said once, above the first panel.
         _name_lines(axis, variables, lines, [*(marks if axis is axes[0] else []), *peaks])
         axis.margins(x=0.0)
-    axes[-1].xaxis.set_major_locator(MaxNLocator(6))
-    axes[-1].set_xlabel(label(samples["time"]) + words)
+    count_time(axes[-1], samples["time"], view.window, words)
     return figure
 
 
@@ -96,6 +97,39 @@ def time_part(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> tuple
     if window.given or period is None or part == window.whole(time):
         return part, ""
     return part, f", first {SHOWN_PERIODS} of {round(float(np.ptp(time)) / period, 1):g} periods"
+
+
+def count_time(axis: Axes, time: xr.DataArray, window: Window, words: str) -> None:
+    """Label the instants of a panel: from the first one on, where a long transient came before the record.
+
+    Instants that a window names stay those of the file, as all data of the panel do.
+    """
+    # long numbers of late instants would run together
+    axis.xaxis.set_major_locator(MaxNLocator(6))
+    axis.set_xlabel(label(time) + words)
+    low, high = axis.dataLim.intervalx
+    first = float(time.values[0])
+    if window.given or not first > _LATE * (high - low) > 0.0:
+        return
+    axis.xaxis.set_major_locator(_CountedFrom(first))
+    digits = math.ceil(6.0 - math.log10(high - low))  # rounding of late instants is none of the tick
+    axis.xaxis.set_major_formatter(
+        FuncFormatter(lambda instant, _: f"{round(instant - first, digits) + 0.0:.6g}")
+    )
+    axis.set_xlabel(f"time from {first:.8g} on ({unit_symbol(time)}){words}")
+
+
+class _CountedFrom(MaxNLocator):
+    """Puts ticks at whole numbers after an instant."""
+
+    def __init__(self, first: float) -> None:
+        super().__init__(6)
+        self._first = first
+
+    def tick_values(self, vmin: float, vmax: float) -> Floats:
+        """Return the ticks between two instants."""
+        ticks: Floats = np.asarray(super().tick_values(vmin - self._first, vmax - self._first))
+        return self._first + ticks
 
 
 def selected(run: int | None) -> dict[str, int]:

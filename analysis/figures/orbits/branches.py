@@ -15,6 +15,7 @@ from vibroimpact.analysis.figures.sweep.diagrams import (
     draw_map,
     edges,
     in_order_of_the_scene,
+    refuse_variable,
     varied,
     wrong_sweep,
 )
@@ -48,7 +49,7 @@ _MARKS = {
 }
 
 
-def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure:
+def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable: str | None = None) -> Figure:
     """Draw displacement range and impact velocity of orbits over their parameter: stable solid, unstable dashed.
 
     Parameters
@@ -57,19 +58,25 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure
         Branches of orbits.
     over : xarray.Dataset, optional
         A sweep of the same parameter, drawn below.
+    variable : str, optional
+        Draw this instead: one of `diagrams.drawable_variables`.
 
     Raises
     ------
     DatasetError
-        The sweep is one of something else.
+        The sweep is one of something else, or the variable was not recorded.
     """
     names = varied(dataset)
-    if len(names) == 2:
+    if variable is not None:
+        refuse_variable(dataset, variable, "orbits")
+        if over is not None:
+            refuse_variable(over, variable, "the sweep")
+    if len(names) == 2 and variable is None:
         return _draw_loci(dataset, names, over)
     if len(names) != 1:
         raise DatasetError(wrong_sweep("orbits at several values of one or two parameters", dataset))
     (name,) = names
-    panels = ["displacement_range", "impact_velocity"]
+    panels = ["displacement_range", "impact_velocity"] if variable is None else [variable]
     if over is not None:
         panels = [panel for panel in panels if panel in over.variables]
         if varied(over) != [name] or not panels:
@@ -134,8 +141,11 @@ def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:
     if panel == "displacement_range":
         ranges = runs["displacement_max"].values - runs["displacement_min"].values
         return [row[np.isfinite(row)] for row in np.atleast_2d(ranges)]
+    if dataset[panel].dims != ("impact",):
+        values = np.asarray(runs[panel].values, dtype=np.float64)
+        return [row[np.isfinite(row)] for row in values.reshape(len(values), -1)]
     counts = np.asarray(runs["impact_count"].values, dtype=int)
-    return np.split(np.asarray(dataset["impact_velocity"].values), np.cumsum(counts)[:-1])
+    return np.split(np.asarray(dataset[panel].values), np.cumsum(counts)[:-1])
 
 
 def draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str, words: str = "simulated") -> None:

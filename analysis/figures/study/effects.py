@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from textwrap import wrap
 
 import numpy as np
 import xarray as xr
@@ -14,10 +15,12 @@ from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missi
 
 _NEEDED = ("share", "seconds", "run_seconds", "name", "changes")
 _BAR_MM = 9
+_LETTERS, _LINE_MM = 6, 2.9
+"""Size of what is written beside a bar, points, and height of its lines."""
 _CONVERGENCE_MM = 45
-_WORDS = 0.55
+_WORDS = 0.75
 """Room for what is written beside the bars, over that of the bars."""
-_LONGEST = 28
+_LONGEST = 24
 """Letters in a line of what is written beside a bar."""
 _CLASSES = ("orbit", "orbit_without")
 
@@ -43,11 +46,14 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     missing = missing_from(dataset, _NEEDED) or ([] if dataset["share"].size else ["effect"])
     refuse_missing(missing, "what `vibroimpact effects` writes")
     names = [str(name) for name in dataset["name"].values]
-    places = np.arange(len(names))[::-1]
     parts = 100.0 * dataset["seconds"].values / dataset["run_seconds"].values[:, None]
     converges = "modes_tried" in dataset.attrs
     with page_style():
-        bars = 25 + _BAR_MM * len(names)
+        beside = _beside(dataset)
+        rows = np.array([max(_BAR_MM, _LINE_MM * (1 + words.count("\n"))) for words in beside])
+        bars = 25 + float(rows.sum())
+        # bars are as far from each other as what is written beside them is high
+        places = ((rows.sum() - np.cumsum(rows) + 0.5 * rows) / _BAR_MM) - 0.5
         figure = canvas(bars + (_CONVERGENCE_MM if converges else 0))
         if converges:
             axis, below = figure.subplots(2, 1, height_ratios=[bars, _CONVERGENCE_MM])
@@ -56,9 +62,15 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
             axis = figure.subplots()
         axis.barh(places, 100.0 * dataset["share"].values, height=0.6, color=LINE, alpha=0.5)
         axis.plot(parts, np.broadcast_to(places[:, None], parts.shape), ".", color=MARK, markersize=2.5)
-        for place, words in zip(places, _beside(dataset), strict=True):
+        for place, words in zip(places, beside, strict=True):
             axis.text(
-                0.98, place, words, fontsize=5, ha="right", va="center", transform=axis.get_yaxis_transform()
+                0.98,
+                place,
+                words,
+                fontsize=_LETTERS,
+                ha="right",
+                va="center",
+                transform=axis.get_yaxis_transform(),
             )
         axis.axvline(0.0, color="0.5", linewidth=0.6)
         axis.set_yticks(places, names, fontsize=6)
@@ -82,8 +94,7 @@ def _beside(dataset: xr.Dataset) -> list[str]:
             and np.isfinite(ends := dataset["displacement_range"].values[row]).all()
         ):
             lines.append(f"range {100.0 * (ends[1] / ends[0] - 1.0):+.3g} %" if ends[0] > 0.0 else "")
-        shown = (line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..." for line in lines if line)
-        found.append("\n".join(shown))
+        found.append("\n".join(part for line in lines for part in wrap(line, _LONGEST)))
     return found
 
 

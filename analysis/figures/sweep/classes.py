@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.analysis.dataset.schema import OrbitClass, scene_of
 from vibroimpact.analysis.figures.page import canvas, label
 from vibroimpact.analysis.figures.sweep.diagrams import (
     edges,
@@ -25,7 +25,11 @@ from vibroimpact.fmus.errors import DatasetError
 
 KIND = "class_kind"
 _COLOURS = ("#0F4C81", "#56A5DC", "#3C7D3C", "#9BC46B", "#7A4B9A", "#C79BD6", "#8A6D00", "#E0B53A")
-_OWN = {"no impacts": "0.85", "chaos": "#B5410B", "rest": "0.55", "unknown": "0.35"}
+OWN_COLOURS = {"no impacts": "0.85", "chaos": "#B5410B", "rest": "0.55", "unknown": "0.35"}
+_SHORT = 10
+"""Letters of a name of the legend, of which four fit beside each other."""
+OTHER_COLOUR = "#EFD9B4"
+"""Light, and no colour of a class: chaos and what is rare are not to be taken for each other."""
 _MOST_NAMED = 8
 """Classes with a colour of their own; those of fewer runs are `other`."""
 
@@ -46,27 +50,53 @@ def draw_classes(dataset: xr.Dataset) -> Figure:
     return _draw_sweep(dataset, names[0])
 
 
-def _names(dataset: xr.Dataset) -> Any:
-    """Return the class of each run in words, in the shape of the runs; empty where there is no run."""
+def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
+    """Return the class of each run in words, in the shape of the runs; empty where there is no run.
 
-    def named(kind: int, impacts: int, periods: int) -> str:
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With the classes of runs, in any shape.
+    impacts_of : xarray.Dataset, optional
+        The dataset with their impacts; by default the same.
+    """
+
+    def named(kind: int, impacts: int, periods: int, stop: int) -> str:
         if kind < 0:
             return ""
         if OrbitClass(kind) in (OrbitClass.periodic, OrbitClass.sticking):
-            return f"P({impacts if impacts >= 0 else 'inf'},{periods})"
+            where = f" at stop {stop}" if stop > 0 else ""
+            return f"P({impacts if impacts >= 0 else 'inf'},{periods}){where}"
         return str(OrbitClass(kind).name).replace("_", " ")
 
     columns = [dataset[name].values for name in (KIND, "class_impacts", "class_periods")]
-    return np.vectorize(named, otypes=[object])(*columns)
+    only = _only_stop(dataset if impacts_of is None else impacts_of)
+    ids, padded = dataset["run_id"].values, np.append(only, 0)
+    at = np.where((ids >= 0) & (ids < only.size), ids, only.size)
+    return np.vectorize(named, otypes=[object])(*columns, padded[at])
+
+
+def _only_stop(dataset: xr.Dataset) -> Any:
+    """Return for each `run_id` the only stop that a run of a body with several stops hits; 0 for any other run."""
+    written = scene_of(dataset.attrs).get("stop")
+    recorded = {"impact_run", "impact_contact"} <= set(dataset.variables) and dataset.sizes["impact"]
+    if not isinstance(written, list) or len(written) < 2 or not recorded:
+        return np.zeros(0, dtype=int)
+    owner, contact = dataset["impact_run"].values, dataset["impact_contact"].values.astype(int)
+    lowest = np.full(int(owner.max()) + 1, np.iinfo(int).max)
+    highest = np.zeros_like(lowest)
+    np.minimum.at(lowest, owner, contact)
+    np.maximum.at(highest, owner, contact)
+    return np.where(lowest == highest, highest, 0)
 
 
 def _palette(names: Any) -> dict[str, str]:
     """Return the colour of each class: the frequent ones have one of their own."""
     counts = Counter(str(name) for name in names.ravel() if name)
-    own = [name for name, _ in counts.most_common() if name not in _OWN][:_MOST_NAMED]
+    own = [name for name, _ in counts.most_common() if name not in OWN_COLOURS][:_MOST_NAMED]
     palette = dict(zip(sorted(own), _COLOURS, strict=False))
-    palette |= {name: colour for name, colour in _OWN.items() if name in counts}
-    return palette | ({"other": "#000000"} if set(counts) - set(palette) else {})
+    palette |= {name: colour for name, colour in OWN_COLOURS.items() if name in counts}
+    return palette | ({"other": OTHER_COLOUR} if set(counts) - set(palette) else {})
 
 
 def _legend(figure: Figure, palette: dict[str, str]) -> None:
@@ -74,7 +104,7 @@ def _legend(figure: Figure, palette: dict[str, str]) -> None:
     figure.legend(
         handles=patches,
         loc="outside upper center",
-        ncols=4,
+        ncols=4 if max(map(len, palette)) <= _SHORT else 3,
         frameon=False,
         handlelength=1.0,
         columnspacing=1.2,
@@ -118,7 +148,7 @@ def _draw_sweep(dataset: xr.Dataset, name: str) -> Figure:
     quantity = next((q for q in ("displacement_max", "strobe_displacement") if q in runs), None)
     if quantity is None:
         raise DatasetError("figure: expected extrema or strobe in the dataset, got neither.")
-    names = _names(runs)
+    names = _names(runs, dataset)
     palette = _palette(names)
     figure = canvas(70)
     axis = figure.subplots()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of, standing_for, swept_names
-from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_outside
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 
 # Relative difference of runs on one orbit: rounding, and what is left of their transients.
 _NOISE = 1e-9
@@ -27,6 +29,12 @@ _SWEEPS: dict[str, dict[str, Any]] = {
     "down": {"marker": "x", "color": "#B5410B", "markersize": 1.5, "markeredgewidth": 0.5},
     "independent": {"marker": ".", "color": "#20567D", "markersize": 1.6, "markeredgewidth": 0.0},
 }
+# Colours of the impacts on the first stop, the second, ...; light for one direction and dark for the other.
+_OF_STOPS: tuple[dict[str, str], ...] = (
+    {direction: style["color"] for direction, style in _SWEEPS.items()},
+    {"up": "#E0B53A", "down": "#5B2C83", "independent": "#D55E00"},
+    {"up": "#9AD0A5", "down": "#222222", "independent": "#009E73"},
+)
 
 # Distinct values above which a column is a crowd; area (points squared) and least opacity of a point in a crowd;
 # distance, over the largest value, below which two values are one.
@@ -41,6 +49,15 @@ _WIDE = 8.0
 _WIDEST = 1e6
 # Cells of a map of scattered points along each axis.
 _CELLS = 500
+# Numbers of runs and their periods, and of their impacts, that are drawn over a swept parameter.
+_OF_PERIODS = (
+    *("displacement_range", "displacement_max", "displacement_min"),
+    *("strobe_displacement", "strobe_velocity", "impacts_per_period"),
+)
+_OF_IMPACTS = (
+    *("impact_velocity", "impact_phase", "impact_impulse"),
+    *("impact_duration", "impact_peak_force", "impact_restitution"),
+)
 _NEITHER = (
     "figure: expected extrema or impacts in the dataset, got neither. "
     "Set extrema = true or impacts = true in [record]."
@@ -132,8 +149,39 @@ def edges(values: Any) -> Any:
     return np.exp(found) if logarithmic else found
 
 
-def draw_bifurcation(dataset: xr.Dataset) -> Figure:
-    """Draw displacement range and impact velocity against the swept parameter, up and down told apart."""
+def drawable_variables(dataset: xr.Dataset) -> list[str]:
+    """Return what can be drawn over a swept parameter: numbers of runs, of their periods and of their impacts."""
+    known = (*_OF_PERIODS, *_OF_IMPACTS)
+    return [name for name in known if name in dataset.variables]
+
+
+def refuse_variable(dataset: xr.Dataset, variable: str, whose: str) -> None:
+    """Raise DatasetError unless a dataset has a variable that can be drawn over a swept parameter."""
+    known = drawable_variables(dataset)
+    if variable not in known:
+        raise DatasetError(
+            f"figure: {option('variable')}: expected one that {whose} recorded "
+            f"({', '.join(known) or 'none is there'}), got {variable!r}."
+        )
+
+
+def draw_bifurcation(dataset: xr.Dataset, variable: str | None = None) -> Figure:
+    """Draw displacement range and impact velocity against the swept parameter, up and down told apart.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    variable : str, optional
+        Draw this instead: one of `drawable_variables`.
+
+    Raises
+    ------
+    DatasetError
+        Neither was recorded, or the variable was not.
+    """
+    if variable is not None:
+        refuse_variable(dataset, variable, "the sweep")
+        return draw_diagram(dataset, [variable])
     panels = [q for q in ("displacement_range", "impact_velocity") if q in dataset.variables]
     if not panels:
         raise DatasetError(_NEITHER)
@@ -150,8 +198,11 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
     axes = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     directions = [d for d in _SWEEPS if d in np.unique(runs["direction"].values)]
     for axis, quantity in zip(axes, panels, strict=True):
-        for direction in directions:
-            _draw_branch(axis, *_points(dataset, runs, name, quantity, direction), direction)
+        hit = _stops_hit(dataset) if dataset[quantity].dims == ("impact",) else [None]
+        for stop, direction in product(hit, directions):
+            _draw_branch(axis, *_points(dataset, runs, name, quantity, direction, stop), direction, stop)
+        if len(hit) > 1 and axis is not axes[0]:
+            legend_above(axis, "center", ncols=2, markerscale=2.2, fontsize=7, handlelength=1.0)
         axis.set_ylabel(label(dataset[quantity]))
         drawn = np.concatenate(
             [np.asarray(line.get_ydata()) for line in axis.lines]
@@ -165,9 +216,17 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
     if is_logarithmic(dataset[name].values):
         axes[-1].set_xscale("log")
     axes[-1].margins(x=0.02)
-    if len(directions) > 1:
+    if len(axes[0].get_legend_handles_labels()[1]) > 1:
         legend_outside(figure, axes[0], ncols=2, markerscale=2.2)
     return figure
+
+
+def _stops_hit(dataset: xr.Dataset) -> list[int | None]:
+    """Return the stops whose impacts are told apart; one None where only one stop is hit."""
+    if "impact_contact" not in dataset.variables:
+        return [None]
+    found: list[int | None] = [int(stop) for stop in np.unique(dataset["impact_contact"].values)]
+    return found if len(found) > 1 else [None]
 
 
 def wrong_sweep(expected: str, dataset: xr.Dataset) -> str:
@@ -179,11 +238,14 @@ def wrong_sweep(expected: str, dataset: xr.Dataset) -> str:
     )
 
 
-def _draw_branch(axis: Axes, x: Any, y: Any, direction: str) -> None:
-    """Draw the points of one branch; those of a crowd are small and faint."""
-    crowd, style = crowded(x, y), _SWEEPS[direction]
+def _draw_branch(axis: Axes, x: Any, y: Any, direction: str, stop: int | None = None) -> None:
+    """Draw the points of one branch, of one stop; those of a crowd are small and faint."""
+    crowd, style, words = crowded(x, y), dict(_SWEEPS[direction]), [f"{direction} sweep"]
+    if stop is not None:
+        style["color"] = _OF_STOPS[(stop - 1) % len(_OF_STOPS)][direction]
+        words = [*(words if direction != "independent" else []), f"stop {stop}"]
     single = crowd <= 1.0
-    axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=f"{direction} sweep", **style)
+    axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=", ".join(words), **style)
     if not single.all():
         opacity = np.clip(1.0 / crowd[~single], _FAINTEST, 1.0)
         faded = {"color": style["color"], "alpha": opacity, "linewidths": 0.0}
@@ -202,13 +264,13 @@ def _fit_limits(axis: Axes, drawn: Any) -> None:
 
 
 def _points(
-    dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str
+    dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str, stop: int | None = None
 ) -> tuple[Any, Any]:
-    """Return the points of one branch: one for each run, or for each period or impact of its runs."""
+    """Return the points of one branch: one for each run, or for each period or impact (on a stop) of its runs."""
     parameter = runs[name].values
     # one direction alone is a scalar
     chosen = np.broadcast_to(runs["direction"].values == direction, parameter.shape)
-    if quantity != "impact_velocity":
+    if dataset[quantity].dims != ("impact",):
         values = runs[quantity].values[chosen]
         return np.repeat(parameter[chosen], values[:1].size), values.ravel()
     # Positions of the runs in the file lead from each impact to the parameter of its run.
@@ -218,7 +280,9 @@ def _points(
     at[ids[inside]] = parameter[inside]
     x = at[dataset["impact_run"].values]
     kept = np.isfinite(x)
-    return x[kept], dataset["impact_velocity"].values[kept]
+    if stop is not None:
+        kept &= dataset["impact_contact"].values == stop
+    return x[kept], dataset[quantity].values[kept]
 
 
 def crowded(x: Any, y: Any) -> Any:

@@ -1,0 +1,75 @@
+"""Lines of motions in the phase plane that stay readable where a motion goes round many times."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+
+from vibroimpact.analysis.figures.page import Floats
+
+FEW_TURNS = 20
+"""Turns up to which a motion is one line; beyond it each turn is a faint layer, and layers add up to a density."""
+_THIN = 0.3
+"""Width of a layer, points."""
+_OPACITY, _FAINTEST = 2.0, 0.03
+"""Opacity of a layer times the square root of their number, and the least: 60 turns .26, 2,000 turns .045."""
+
+
+def draw_turns(axis: Axes, displacement: Floats, velocity: Floats, **style: Any) -> None:
+    """Draw a motion in the phase plane, a long one as layers.
+
+    A single line does not darken where it crosses itself, so that a chaotic motion would be one filled shape.
+
+    Parameters
+    ----------
+    axis : Axes
+    displacement, velocity : ndarray, shape (sample,)
+        NaN where the line has a gap.
+    style
+        Of a line, with its `color` and `label`.
+    """
+    begins = turn_begins(velocity)
+    if begins.size <= FEW_TURNS:
+        axis.plot(displacement, velocity, **style)
+        return
+    points = np.column_stack([displacement, velocity])
+    # a layer goes on to the first point of the next one
+    layers = np.split(points, begins)
+    joined = [np.vstack([one, other[:1]]) for one, other in pairwise(layers)]
+    draw_layers(axis, [*joined, layers[-1]], **style)
+
+
+def draw_layers(axis: Axes, layers: Any, **style: Any) -> None:
+    """Draw lines as faint layers; what names them is as dark as any other line.
+
+    Parameters
+    ----------
+    axis : Axes
+    layers : sequence of ndarray, shape (point, 2)
+    style
+        Of a line, with its `color` and `label`.
+    """
+    words, colour = style.pop("label", None), style.pop("color")
+    opacity = max(_FAINTEST, _OPACITY / np.sqrt(max(len(layers), 1)))
+    lines = LineCollection(layers, colors=colour, linewidths=_THIN, alpha=min(1.0, opacity), **style)
+    axis.add_collection(lines)
+    if words is not None:
+        axis.plot([], [], color=colour, label=words)
+    axis.autoscale_view()
+
+
+def turn_begins(velocity: Floats) -> Any:
+    """Return the samples at which a motion begins a turn: its velocity becomes positive.
+
+    Examples
+    --------
+    >>> turn_begins(np.array([-1.0, 1.0, np.nan, -1.0, -1.0, 2.0])).tolist()
+    [1, 5]
+    """
+    known = np.flatnonzero(np.isfinite(velocity))
+    positive = velocity[known] > 0.0
+    return known[1:][positive[1:] & ~positive[:-1]]
