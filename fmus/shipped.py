@@ -24,7 +24,7 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
     Parameters
     ----------
     name : str
-        Name of the component, `Oscillator`, or of its folder, `oscillator`.
+        Name of the component in any spelling: `ImpactStop`, `impact_stop`, `impact-stop`.
     fmi : str
         `3.0` or `2.0`.
 
@@ -49,23 +49,44 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
 
 
 def component_name(name: str) -> str:
-    """Return a component's name from its name or its folder's, whatever the case.
+    """Return a component's name from any spelling of it.
 
     Raises
     ------
     ComponentFileError
         There is no such component; the nearest name is offered.
+
+    Examples
+    --------
+    >>> component_name("impact-stop"), component_name("Impact Stop"), component_name("IMPACT_STOP")
+    ('ImpactStop', 'ImpactStop', 'ImpactStop')
     """
-    known = {spelling.lower(): own for own, folder in _folders().items() for spelling in (own, folder)}
-    if name.lower() in known:
-        return known[name.lower()]
-    near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5)
+    known = {letters_of(own): own for own in components()}
+    if letters_of(name) in known:
+        return known[letters_of(name)]
+    near = difflib.get_close_matches(letters_of(name), known, n=1, cutoff=0.5)
     hint = f" Did you mean {known[near[0]]}?" if near else ""
     raise ComponentFileError(f"component: expected one of {', '.join(components())}, got {name!r}.{hint}")
 
 
+def is_component(name: str) -> bool:
+    """Return whether a text is the name of a component of the package, in any spelling."""
+    return letters_of(name) in map(letters_of, components())
+
+
+def letters_of(name: str) -> str:
+    """Return the letters and digits of a name in lower case, which are the same in all its spellings.
+
+    Examples
+    --------
+    >>> letters_of("user-contact-law") == letters_of("UserContactLaw")
+    True
+    """
+    return "".join(filter(str.isalnum, name.lower()))
+
+
 def component_folder(name: str) -> Path:
-    """Return the folder of a component's own sources, from its name or its folder's.
+    """Return the folder of a component's own sources, from any spelling of its name.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from typing import Any
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.fmus.shipped import components
+from vibroimpact.fmus.shipped import components, is_component
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -108,7 +108,7 @@ def _files(document: Mapping[str, Any], shelf: Shelf) -> tuple[dict[str, Path], 
     tables = document.get("component", {})
     for name, table in tables.items() if isinstance(tables, Mapping) else ():
         fmu = table.get("fmu") if isinstance(table, Mapping) else None
-        if fmu is None or fmu in components():
+        if fmu is None or (isinstance(fmu, str) and is_component(fmu)):
             continue
         file = shelf.fmus.find(fmu) if isinstance(fmu, str) else None
         if file is not None:

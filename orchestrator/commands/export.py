@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.commands.fmu import export_component, export_user_law
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.fmus.terminal import note, say
 
 USER_CONTACT_LAW = "user-contact-law"
@@ -28,7 +29,7 @@ def export_to_file(
         for name, value in {**counts, **kinds, "platform": platform}.items()
         if value not in (None, False)
     ]
-    if component == USER_CONTACT_LAW:
+    if letters_of(component) == letters_of(USER_CONTACT_LAW):
         say(str(export_user_law(law, output, given + ["--set"] * bool(changes))))
         return
     if law is not None:

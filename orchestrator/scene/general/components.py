@@ -13,6 +13,7 @@ from typing import Any
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
+from vibroimpact.fmus.shipped import is_component
 from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
 from vibroimpact.orchestrator.scene.general.component_facts import (
     ComponentFacts,
@@ -113,7 +114,7 @@ def _is_file_name(text: str) -> bool:
 
 def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Problem]) -> Path | None:
     where = key_path((*path, "fmu"))
-    if table.fmu not in components():
+    if not is_component(table.fmu):
         expected = "a path that ends in .fmu, or the name of a shipped component"
         problems.append(
             Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, components()))

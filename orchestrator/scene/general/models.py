@@ -37,7 +37,7 @@ class ComponentTable(SceneTable):
             hint='For example "ball.fmu".',
             doc="a file name that ends in `.fmu`, from the folder of the scene file; or a shipped component: "
             '`"Oscillator"`, `"Chain"`, `"Beam"`, `"ImpactStop"`, `"Gain"`, `"Sensor"`, `"LoadCell"`, `"Exciter"`, '
-            '`"Noise"`, `"AnalogInput"`',
+            '`"Noise"`, `"AnalogInput"`, in any spelling',
         ),
     ]
     fmi: Annotated[

@@ -1,5 +1,6 @@
 """`fmu check` finds what a validator of the description alone does not."""
 
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -150,7 +151,18 @@ def test_more_contacts_than_were_compiled_in_are_refused(tmp_path: Path) -> None
 def test_an_unknown_component_gets_the_nearest_name_offered() -> None:
     with pytest.raises(ComponentFileError, match="Did you mean Oscillator"):
         fmu_path("Oscilator")
-    assert component_name("OSCILLATOR") == "Oscillator"
+
+
+def test_a_component_is_known_in_any_spelling_of_its_name() -> None:
+    for name in components():
+        words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+        for sign in "-_ ":
+            assert component_name(words.replace(" ", sign)) == name
+            assert component_name(words.replace(" ", sign).lower()) == name
+        assert component_name(name.upper()) == name
+    for nothing in ("", "-", "impact stop!1"):
+        with pytest.raises(ComponentFileError, match="component: expected one of"):
+            component_name(nothing)
 
 
 def test_an_unknown_version_is_refused() -> None:
