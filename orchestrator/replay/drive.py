@@ -48,7 +48,14 @@ class DriveSignal:
     remarks: tuple[str, ...]
 
 
-def drive_of(channel: Channel, drive: str, offset: float | None = None, expected: str = "") -> DriveSignal:
+def drive_of(
+    channel: Channel,
+    drive: str,
+    offset: float | None = None,
+    expected: str = "",
+    *,
+    designed: bool = False,
+) -> DriveSignal:
     """Return what a channel drives a body with.
 
     Parameters
@@ -60,6 +67,8 @@ def drive_of(channel: Channel, drive: str, offset: float | None = None, expected
         Taken off every sample, in the unit of the channel; None for `quiet_level`.
     expected : str
         SI unit that the channel must have; that of the drive where it is empty.
+    designed : bool
+        Whether the channel was computed, not measured: without an offset that is given, its mean is kept.
 
     Raises
     ------
@@ -75,21 +84,33 @@ def drive_of(channel: Channel, drive: str, offset: float | None = None, expected
     known = np.isfinite(channel.values)
     if np.count_nonzero(known) < 2:
         raise DatasetError(f"{channel.name}: expected at least two samples to drive a body, got fewer.")
+    remarks = []
     if offset is None:
-        # what was simulated has no offset to be taken off
-        offset = 0.0 if channel.attrs.get("role") == "simulated" else quiet_level(channel.values[known])
+        quiet = quiet_level(channel.values[known])
+        simulated = channel.attrs.get("role") == "simulated"  # it has no offset to be taken off
+        offset = 0.0 if designed or simulated else quiet
+        if designed and quiet and not simulated:
+            remarks.append(f"{channel.name}: {_designed(channel, quiet)}")
     level = offset
     values = np.interp(channel.time, channel.time[known], channel.values[known]) - level
     return DriveSignal(
-        channel.time, values * unit.factor, ~known, level, tuple(_remarks(channel, level, ~known))
+        channel.time, values * unit.factor, ~known, level, tuple(remarks + _remarks(channel, level, ~known))
     )
+
+
+def _designed(channel: Channel, level: float) -> str:
+    value = _in_its_unit(channel, level)
+    return f"its level of {value} is kept: nothing is compared, so it counts as designed (drive_offset takes one off)"
+
+
+def _in_its_unit(channel: Channel, value: float) -> str:
+    return f"{value:.6g}" + ("" if channel.unit == "1" else f" {unit_label(channel.unit)}")
 
 
 def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list[str]:
     remarks = []
     if level:
-        offset = f"{level:.6g}" + ("" if channel.unit == "1" else f" {unit_label(channel.unit)}")
-        remarks.append(f"{channel.name}: an offset of {offset} was taken off")
+        remarks.append(f"{channel.name}: an offset of {_in_its_unit(channel, level)} was taken off")
     if bridged.any():
         remarks.append(f"{channel.name}: {int(bridged.sum())} missing samples were bridged by straight lines")
     clipped = int(np.count_nonzero(channel.quality & Quality.clipped))

@@ -133,7 +133,12 @@ class Replayer:
             return None
         channel = self.recording.channel(replay.channel)
         unit = "" if self.scene.exciter is None else VOLTS
-        return drive_of(channel, replay.drive, replay.drive_offset, unit)
+        return drive_of(channel, replay.drive, replay.drive_offset, unit, designed=self._is_designed(channel))
+
+    def _is_designed(self, channel: Channel) -> bool:
+        """Return whether a drive is a force that somebody computed: nothing measured is compared with its motion."""
+        computed = self.replay.drive == "force" and self.scene.exciter is None and not self.replay.compare
+        return computed and "terminal" not in channel.attrs  # which a channel of a rig has
 
     def _instants(self) -> tuple[Floats, Floats | None]:
         """Return the instants of the simulation, and the drive there."""

@@ -76,7 +76,7 @@ class Replay(SceneTable):
             unit="unit of the channel",
             hint="Without it the channel's level before and after its event is taken off.",
             doc="taken off what drives",
-            default="the channel's level where it is quietest",
+            default="the channel's level where it is quietest; 0 for a force beside which nothing is compared",
         ),
     ] = None
     start: Annotated[

@@ -105,6 +105,8 @@ def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
         hint = "A constant force has no period to count; run it as a scene of its own."
         yield Problem("sweep", "frequencies that are all > 0, or all 0", "0 among others", hint)
         return
+    if "replay" in draft.document:
+        return  # its recording says how long it lasts: see rules.replay
     forced = span[0] > 0.0
     right, wrong = (PERIOD_KEYS, TIME_KEYS) if forced else (TIME_KEYS, PERIOD_KEYS)
     yield from _wrong_durations(draft, right, wrong, forced)
@@ -113,7 +115,7 @@ def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
 
 def _missing_duration(draft: Draft, right: str, wrong: str) -> Iterator[Problem]:
     raw = draft.document.get("record")
-    if raw is None and ("body" not in draft.document or "replay" in draft.document):
+    if raw is None and "body" not in draft.document:
         return  # a file without the main table is told only that
     if raw is None or (isinstance(raw, dict) and right not in raw and wrong not in raw):
         unit = "a whole number of forcing periods" if right in PERIOD_KEYS else "a number > 0 (time)"

@@ -422,3 +422,48 @@ def test_simulated_impacts_are_not_called_extra_where_none_were_measured(tmp_pat
         (comparison,) = compare_motion(replayer, motion)
     assert len(motion.impacts) > 0
     assert comparison.events is None
+
+
+def test_a_designed_force_keeps_its_mean_and_a_measured_one_does_not(tmp_path: Path) -> None:
+    # a sine on a constant force: the mean of the motion is that force over the stiffness
+    time = 1e-3 * np.arange(8001)
+    path = written(
+        tmp_path / "designed.nc",
+        channel("forcing", time, 1.0 + 0.5 * np.sin(12.0 * time), "N"),
+        channel("displacement", time, np.sin(time), "m"),
+    )
+    compared = parse_scene(FORCED.format(forcing="", rest=REPLAY), "compared.toml")
+    designed = parse_scene(FORCED.format(forcing="", rest=REPLAY[: REPLAY.index("compare")]), "designed.toml")
+    with opened_replays(compared, [path]) as (measured,), opened_replays(designed, [path]) as (replayer,):
+        assert measured.drive is not None
+        assert replayer.drive is not None
+        assert measured.drive.values.mean() == pytest.approx(0.0, abs=1e-12)
+        assert replayer.drive.values.mean() == pytest.approx(1.0, abs=0.01)
+        assert "its level of" in replayer.drive.remarks[0]
+        assert "is kept: nothing is compared" in replayer.drive.remarks[0]
+    given = parse_scene(designed.text + "drive_offset = 0.25\n", "given.toml")
+    with opened_replays(given, [path]) as (replayer,):
+        assert replayer.drive is not None
+        assert replayer.drive.offset == 0.25
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        'time_series = { rate = 500, variables = ["displacement"] }',
+        "impacts = true",
+        "recorded_periods = 4",
+        "recorded_time = 1.0",
+        "",
+    ],
+)
+def test_a_replay_is_never_asked_for_a_duration_that_it_is_refused(record: str) -> None:
+    text = FORCED.format(forcing="", rest=f"{REPLAY}\n[record]\n{record}\n")
+    key = record.partition(" ")[0]
+    if key in ("impacts", ""):
+        assert parse_scene(text, "replay.toml").replay is not None
+        return
+    with pytest.raises(SceneError) as told:
+        parse_scene(text, "replay.toml")
+    (line,) = told.value.problems
+    assert line.startswith(f"replay.toml: record.{key}: expected none beside [replay], got one.")
