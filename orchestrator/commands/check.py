@@ -67,7 +67,7 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
     if meeting := contacts(scene):
         yield "contacts", "; ".join(f"{contact} {what}" for contact, what in meeting.items())
     known = effects(scene)
-    told = ("stops", "contacts")
+    told = ("stops" if scene.stops else "", "contacts")
     yield "effects", ", ".join(name for name, there in known.items() if there and name not in told) or "none"
     yield "without", ", ".join(name for name, there in known.items() if not there)
 

@@ -5,12 +5,19 @@ from __future__ import annotations
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.called import called_by_numbers
+from vibroimpact.orchestrator.scene.component_effects import called_by_components
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 from vibroimpact.orchestrator.scene.scene import Scene
+
+EFFECTS_OF_THE_SHORT_FORM = (
+    *("forcing", "recorded drive", DAMPING, "stops", FALLING_RESTITUTION, AMPLITUDE, "energies"),
+    *("sensor", "load cell", "exciter", FALLING_FORCE, "noise", "AD conversion"),
+)
+"""Effects that tables and numbers of the short form call for, and shipped components of a general scene."""
 
 
 def engine(scene: Scene, execution: str = "auto") -> str:
@@ -78,12 +85,13 @@ def effects(scene: Scene) -> dict[str, bool]:
         "guard process": scene.general.guard if scene.general is not None else scene.execution.guard,
     }
     if scene.general is not None:
+        called = called_by_components(scene.general, scene.sweep)
         found = {
             "connections": bool(scene.general.connections),
             "contacts": bool(scene.general.contacts),
             "watched events": bool(scene.general.events),
         }
-        return found | common
+        return {name: name in called for name in EFFECTS_OF_THE_SHORT_FORM} | found | common
     called, series = called_by_numbers(scene), scene.record.time_series
     followed = not isinstance(scene.body, OscillatorBody) and series is not None
     return {
@@ -125,5 +133,6 @@ def _samples(scene: Scene) -> bool:
 def in_one_line(scene: Scene, execution: str = "auto") -> str:
     """Return engine, laws and effects as one line."""
     stops = [f"{key} {what}" for key, what in (laws(scene) | contacts(scene)).items()]
-    called = [name for name, there in effects(scene).items() if there and name not in ("stops", "contacts")]
+    told = ("stops" if scene.stops else "", "contacts")
+    called = [name for name, there in effects(scene).items() if there and name not in told]
     return "; ".join(part for part in (engine(scene, execution), ", ".join(stops), ", ".join(called)) if part)

@@ -66,7 +66,9 @@ def _variables_are_there(draft: GeneralDraft, place: int, table: StopContactTabl
         facts = _facts(draft, component)
         if facts is not None and name is not None:
             where = key_path(("contact", place, key))
-            yield from variable_problems(where, component, facts, name, causality, unit)
+            yield from variable_problems(
+                where, component, facts, name, causality, None if draft.is_nondimensional else unit
+            )
 
 
 def _component_problems(draft: GeneralDraft, place: int, key: str, name: str) -> Iterator[Problem]:

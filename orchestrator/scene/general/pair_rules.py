@@ -107,7 +107,8 @@ def _foreign_point_problems(
         ("force", "input", newton),
     ):
         where = key_path(("contact", place, "bodies", name, key))
-        yield from variable_problems(where, name, facts, getattr(point, key), causality, unit)
+        compared = None if draft.is_nondimensional else unit
+        yield from variable_problems(where, name, facts, getattr(point, key), causality, compared)
     if not facts.restorable:
         got = f"{facts.file}, which does not have canGetAndSetFMUState"
         hint = "The instant at which two bodies meet is found by going back."

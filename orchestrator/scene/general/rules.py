@@ -91,6 +91,11 @@ class GeneralDraft(DraftTables):
             return self.variant(PAIR_MODELS, "law", "restitution", raw, path)
         return self.read(StopContactTable, raw, path)
 
+    @property
+    def is_nondimensional(self) -> bool:
+        """Whether all numbers of the scene are without units, whatever its FMUs declare."""
+        return self.header is not None and self.header.units == "nondimensional"
+
     def facts(self, reference: str) -> ComponentFacts | None:
         """Return the facts of the component that a reference names; None when they are not known."""
         component = self.components.get(component_variable(reference)[0])
@@ -180,8 +185,15 @@ def _connections_join_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
         source, target = draft.variable(connection.source), draft.variable(connection.target)
         if source and target and not any(wrong):
             yield from _type_problems(connection, place, source, target)
-            if not gain_problem:
+            if not gain_problem and not _is_without_units(draft, source, target):
                 yield from _unit_problems(connection, place, gain, source, target)
+
+
+def _is_without_units(draft: GeneralDraft, source: VariableFacts, target: VariableFacts) -> bool:
+    """Return whether both ends are plain numbers: in a nondimensional scene, unless one kind has two scales (m, mm)."""
+    if not draft.is_nondimensional:
+        return False
+    return source.unit is None or target.unit is None or source.unit.exponents != target.unit.exponents
 
 
 def _end_problem(draft: GeneralDraft, place: int, end: str, reference: str) -> Problem | None:

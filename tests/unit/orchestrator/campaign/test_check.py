@@ -79,6 +79,53 @@ def test_only_the_effects_that_a_scene_calls_for_are_there() -> None:
     assert called_for(scene_of(BODY + RECORD + series)) == {"time series"}
 
 
+MEASURED_COMPONENTS = """
+[component.body]
+fmu = "Beam"
+[component.body.parameters]
+"forcing.amplitude" = 1.0
+"forcing.angular_frequency" = 9.0
+"damping_ratio[1]" = 0.01
+"contact[1].law" = "restitution"
+"contact[1].position" = 0.1
+"contact[1].yield_velocity" = 0.5
+"contact[2].law" = "none"
+"amplitude.damping_slope[1]" = 0.1
+[component.sensor]
+fmu = "Sensor"
+[component.noise]
+fmu = "Noise"
+[component.converter]
+fmu = "AnalogInput"
+[component.exciter]
+fmu = "Exciter"
+parameters = { distance = 0.0 }
+[record]
+recorded_time = 1.0
+rate = 20
+variables = ["body.energy.kinetic"]
+[execution]
+macro_step = 0.1
+"""
+
+
+def test_components_call_for_the_effects_that_the_short_form_calls_for() -> None:
+    named = {
+        *("forcing", "damping", "stops", "restitution that falls with speed", "energies", "time series"),
+        *("motion that depends on its amplitude", "sensor", "noise", "AD conversion", "exciter"),
+    }
+    assert called_for(scene_of(MEASURED_COMPONENTS)) == named
+    assert "stops" in in_one_line(scene_of(MEASURED_COMPONENTS))
+    swept = MEASURED_COMPONENTS + '[sweep]\n"exciter.distance" = { values = [0.0, 0.5] }\n'
+    assert called_for(scene_of(swept)) == named | {"force that falls with distance"}
+    nothing = MEASURED_COMPONENTS.replace('"restitution"', '"none"').replace(
+        '= 1.0\n"forcing', '= 0.0\n"forcing'
+    )
+    assert called_for(scene_of(nothing)) == named - {"forcing", "stops"}
+    short = set(effects(scene_of(BODY + RECORD)))
+    assert short <= set(effects(scene_of(COMPONENTS)))  # what is not called for is listed as well
+
+
 def test_an_effect_that_is_swept_is_called_for_where_one_point_has_it() -> None:
     swept = BODY + RECORD + '[sweep]\n"body.damping" = { values = [0.0, 0.1], path = "up" }\n'
     assert called_for(scene_of(swept)) == {"damping", "continuation"}

@@ -520,3 +520,23 @@ def test_the_mixed_example_joins_two_versions_of_fmi() -> None:
     general = general_of(load_scene(ROOT / "examples" / "mixed_versions.toml"))
     assert [component.fmu.parent.name for component in general.components] == ["fmi3", "fmi2"]
     assert general.components[0].parameters["contact[1].law"] == 5
+
+
+def test_a_nondimensional_scene_connects_plain_numbers() -> None:
+    # a displacement feeds a force: both are numbers without a unit, whatever the descriptions of the FMUs say
+    text = COUPLED.replace('gain_unit = "N/m"\n', "")
+    with pytest.raises(SceneError, match="the same unit at both ends, got m"):
+        parse_scene(text, "c.toml")
+    scene = parse_scene('[scene]\nunits = "nondimensional"\n' + text, "c.toml")
+    assert scene.general is not None
+    assert scene.general.connections[0].gain == 0.5
+    with_unit = parse_scene('[scene]\nunits = "nondimensional"\n' + COUPLED, "c.toml")
+    assert with_unit.general == scene.general
+    at_once = text.replace("b.displacement", "b.velocity")
+    assert parse_scene('[scene]\nunits = "nondimensional"\n' + at_once, "c.toml").general is not None
+
+
+@pytest.mark.parametrize("name", ["oscillator", "OSCILLATOR", "Oscil lator", "o-s-c-i-l-l-a-t-o-r"])
+def test_a_shipped_component_is_known_in_any_spelling(name: str) -> None:
+    scene, spelled = (parse_scene(each, "c.toml") for each in (COUPLED, COUPLED.replace("Oscillator", name)))
+    assert spelled.general == scene.general

@@ -1,0 +1,83 @@
+"""Which effects of the short form a scene of components calls for: by its shipped components and their numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from vibroimpact.fmus.shipped import package_folder
+from vibroimpact.orchestrator.importer.specification import ComponentSpec
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
+from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE
+from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION
+from vibroimpact.orchestrator.scene.sampled_names import follow_energies
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
+
+STRUCTURES = ("Chain", "Beam")
+"""Bodies that follow their energies only where these are asked for."""
+BODIES = ("Oscillator", *STRUCTURES)
+_PLACE = r"(\[\d+\])?"
+_OF_A_BODY = {
+    "forcing": re.compile(rf"forcing\.(amplitude|base_acceleration){_PLACE}"),
+    DAMPING: re.compile(rf"(far_)?damping(_ratio)?{_PLACE}|rayleigh\.(mass|stiffness)"),
+    AMPLITUDE: re.compile(rf"amplitude\.[a-z_]+{_PLACE}"),
+    "stops": re.compile(rf"contact{_PLACE}\.law"),
+    FALLING_RESTITUTION: re.compile(rf"contact{_PLACE}\.yield_velocity"),
+}
+"""Parameters of bodies that call for an effect where they are not 0; all of them start with 0."""
+_OF_OTHERS = {
+    "ImpactStop": {FALLING_RESTITUTION: re.compile("yield_velocity")},
+    "Exciter": {FALLING_FORCE: re.compile("distance")},
+}
+_WHOLE = {
+    "ImpactStop": "stops",
+    "Replay": "recorded drive",
+    "Sensor": "sensor",
+    "LoadCell": "load cell",
+    "Exciter": "exciter",
+    "Noise": "noise",
+    "AnalogInput": "AD conversion",
+}
+"""Components that are an effect by themselves."""
+
+
+def called_by_components(general: GeneralScene, axes: tuple[SweepAxis, ...]) -> set[str]:
+    """Return the effects that the components of a scene call for, at one point of its sweep at least.
+
+    Parameters
+    ----------
+    general : GeneralScene
+    axes : tuple of SweepAxis
+
+    Returns
+    -------
+    set of str
+        FMUs of other tools call for none that is known.
+    """
+    swept = {axis.key: max(map(abs, axis.values)) for axis in axes}
+    found: set[str] = set()
+    for component in general.components:
+        kind = shipped_kind(component)
+        found |= {_WHOLE[kind]} if kind in _WHOLE else set()
+        patterns = _OF_A_BODY if kind in BODIES else _OF_OTHERS.get(kind, {})
+        given = [name for name, value in _numbers(component, swept) if value]
+        found |= {effect for effect, key in patterns.items() if any(map(key.fullmatch, given))}
+    if any(pair.numbers.get("yield_velocity") for pair in general.pairs):
+        found.add(FALLING_RESTITUTION)
+    kinds = {component.name: shipped_kind(component) for component in general.components}
+    sampled = map(component_variable, general.variables)
+    if follow_energies(name for owner, name in sampled if kinds.get(owner) in STRUCTURES):
+        found.add("energies")
+    return found
+
+
+def shipped_kind(component: ComponentSpec) -> str:
+    """Return which component of the package a component of a scene is; empty for any other FMU."""
+    return component.fmu.stem if component.fmu.is_relative_to(package_folder()) else ""
+
+
+def _numbers(component: ComponentSpec, swept: dict[str, float]) -> Iterator[tuple[str, bool]]:
+    """Yield each parameter, and whether it is not 0 at one point of the sweep at least."""
+    for name, value in component.parameters.items():
+        largest = swept.get(f"{component.name}.{name}", value)
+        yield name, largest not in ("none", "", "0") and bool(largest)
