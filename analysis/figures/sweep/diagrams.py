@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -29,11 +28,19 @@ _SWEEPS: dict[str, dict[str, Any]] = {
     "down": {"marker": "x", "color": "#B5410B", "markersize": 1.5, "markeredgewidth": 0.5},
     "independent": {"marker": ".", "color": "#20567D", "markersize": 1.6, "markeredgewidth": 0.0},
 }
-# Colours of the impacts on the first stop, the second, ...; light for one direction and dark for the other.
-_OF_STOPS: tuple[dict[str, str], ...] = (
-    {direction: style["color"] for direction, style in _SWEEPS.items()},
-    {"up": "#E0B53A", "down": "#5B2C83", "independent": "#D55E00"},
-    {"up": "#9AD0A5", "down": "#222222", "independent": "#009E73"},
+# Changes of that style for impacts on the second stop, the third: all marks stay visible where stops are hit alike.
+_OF_STOPS: tuple[dict[str, dict[str, Any]], ...] = (
+    {"up": {}, "down": {}, "independent": {}},
+    {
+        "up": {"marker": "s", "color": "#E0B53A", "markersize": 3.4},
+        "down": {"marker": "+", "color": "#5B2C83", "markersize": 2.4},
+        "independent": {"color": "#D55E00", "markersize": 1.1},
+    },
+    {
+        "up": {"marker": "D", "color": "#9AD0A5", "markersize": 3.8},
+        "down": {"marker": "1", "color": "#222222", "markersize": 2.8},
+        "independent": {"color": "#009E73", "markersize": 0.8},
+    },
 )
 
 # Distinct values above which a column is a crowd; area (points squared) and least opacity of a point in a crowd;
@@ -199,8 +206,12 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
     directions = [d for d in _SWEEPS if d in np.unique(runs["direction"].values)]
     for axis, quantity in zip(axes, panels, strict=True):
         hit = _stops_hit(dataset) if dataset[quantity].dims == ("impact",) else [None]
-        for stop, direction in product(hit, directions):
-            _draw_branch(axis, *_points(dataset, runs, name, quantity, direction, stop), direction, stop)
+        for direction in directions:
+            x, y, owner = _points(dataset, runs, name, quantity, direction)
+            for stop in hit:
+                _draw_branch(
+                    axis, x, y, direction, stop, np.full(len(x), True) if stop is None else owner == stop
+                )
         if len(hit) > 1 and axis is not axes[0]:
             legend_above(axis, "center", ncols=2, markerscale=2.2, fontsize=7, handlelength=1.0)
         axis.set_ylabel(label(dataset[quantity]))
@@ -238,13 +249,13 @@ def wrong_sweep(expected: str, dataset: xr.Dataset) -> str:
     )
 
 
-def _draw_branch(axis: Axes, x: Any, y: Any, direction: str, stop: int | None = None) -> None:
-    """Draw the points of one branch, of one stop; those of a crowd are small and faint."""
-    crowd, style, words = crowded(x, y), dict(_SWEEPS[direction]), [f"{direction} sweep"]
+def _draw_branch(axis: Axes, x: Any, y: Any, direction: str, stop: int | None, shown: Any) -> None:
+    """Draw the points of one branch, or those of one stop; the points of a crowd are small and faint."""
+    crowd, style, words = crowded(x, y)[shown], dict(_SWEEPS[direction]), [f"{direction} sweep"]
     if stop is not None:
-        style["color"] = _OF_STOPS[(stop - 1) % len(_OF_STOPS)][direction]
+        style |= _OF_STOPS[(stop - 1) % len(_OF_STOPS)][direction]
         words = [*(words if direction != "independent" else []), f"stop {stop}"]
-    single = crowd <= 1.0
+    x, y, single = x[shown], y[shown], crowd <= 1.0
     axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=", ".join(words), **style)
     if not single.all():
         opacity = np.clip(1.0 / crowd[~single], _FAINTEST, 1.0)
@@ -264,15 +275,19 @@ def _fit_limits(axis: Axes, drawn: Any) -> None:
 
 
 def _points(
-    dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str, stop: int | None = None
-) -> tuple[Any, Any]:
-    """Return the points of one branch: one for each run, or for each period or impact (on a stop) of its runs."""
+    dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str
+) -> tuple[Any, Any, Any]:
+    """Return the points of one branch and the stop of each: one for each run, or for each period or impact of its runs.
+
+    What is no impact has stop 0.
+    """
     parameter = runs[name].values
     # one direction alone is a scalar
     chosen = np.broadcast_to(runs["direction"].values == direction, parameter.shape)
     if dataset[quantity].dims != ("impact",):
         values = runs[quantity].values[chosen]
-        return np.repeat(parameter[chosen], values[:1].size), values.ravel()
+        x = np.repeat(parameter[chosen], values[:1].size)
+        return x, values.ravel(), np.zeros(x.size)
     # Positions of the runs in the file lead from each impact to the parameter of its run.
     at = np.full(int(dataset["impact_run"].values.max(initial=-1)) + 1, np.nan)
     ids = runs["run_id"].values
@@ -280,9 +295,8 @@ def _points(
     at[ids[inside]] = parameter[inside]
     x = at[dataset["impact_run"].values]
     kept = np.isfinite(x)
-    if stop is not None:
-        kept &= dataset["impact_contact"].values == stop
-    return x[kept], dataset[quantity].values[kept]
+    stops = dataset["impact_contact"].values if "impact_contact" in dataset.variables else np.zeros(x.size)
+    return x[kept], dataset[quantity].values[kept], stops[kept]
 
 
 def crowded(x: Any, y: Any) -> Any:
