@@ -92,6 +92,8 @@ def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
     """Draw one line, broken where the velocity jumps; the turns of a long one are layers."""
     x, y = (with_gaps(values, jumps) for values in (orbit.displacement, orbit.velocity))
     draw_turns(axis, x, y, color=colour, label=orbit.words, rasterized=True)
+    if not jumps.size:
+        return
     style = {"color": colour, "linestyle": ":", "rasterized": True}
     both = [np.stack([values[jumps - 1], values[jumps]], axis=1) for values in orbit[2:]]
     pairs = np.stack(both, axis=2)

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 
 from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.analysis.figures.page import (
@@ -114,7 +114,9 @@ def count_time(axis: Axes, time: xr.DataArray, window: Window, words: str) -> No
     axis.xaxis.set_major_locator(_CountedFrom(first))
     digits = math.ceil(6.0 - math.log10(high - low))  # rounding of late instants is none of the tick
     axis.xaxis.set_major_formatter(
-        FuncFormatter(lambda instant, _: f"{round(instant - first, digits) + 0.0:.6g}")
+        FuncFormatter(
+            lambda instant, _: ScalarFormatter.fix_minus(f"{round(instant - first, digits) + 0.0:.6g}")
+        )
     )
     axis.set_xlabel(f"time from {first:.8g} on ({unit_symbol(time)}){words}")
 

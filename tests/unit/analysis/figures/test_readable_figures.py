@@ -118,7 +118,7 @@ def test_what_effects_change_is_written_out(tmp_path: Path) -> None:
             "name": ("effect", np.array(["forcing", "damping"], dtype=object)),
             "share": ("effect", np.array([0.2, 0.1])),
             "seconds": (("effect", "pair"), np.full((2, 3), 0.1)),
-            "run_seconds": ("pair", np.ones(3)),
+            "run_seconds": ("effect", np.ones(2)),
             "changes": ("effect", np.array([words, "nothing"], dtype=object)),
         },
         attrs={"results_kind": "effects"},
