@@ -25,10 +25,16 @@ _LABELS = {
     "Amps": "ampere",
     # thousandths of an inch; pint's mil is one of an angle
     **dict.fromkeys(("mil", "mils", "thou"), "thou"),
+    # strain
+    **dict.fromkeys(("µε", "με", "µstrain", "ustrain", "microstrain"), "1e-6"),
 }
 _OFFSET_LABELS = ("degC", "deg C", "°C", "Celsius", "degree_Celsius")
 # Preferred SI names, as CF (UDUNITS) writes them.
 _SI_NAMES = ("N", "Pa", "V", "J", "W", "N s", "N m", "N m-1", "V s2 m-1", "V N-1", "Hz", "rad", "rad s-1")
+_DEGREES = re.compile(r"°(?![A-Za-z])")
+_DETECTED = re.compile(r"(?P<unit>\S.*?)(?:\s+|(?<=[VAgG²2]))(?:RMS|rms|Rms|pk|pk-pk|p-p|pp|peak)")
+"""A unit, and how the instrument took the value: its size stays that of the unit."""
+_LONGEST_DETECTED = 60
 _SUPERSCRIPTS = str.maketrans("¹²³⁻", "123-")
 _FACTOR = re.compile(
     r"(?:(?P<number>\d{1,9}(?:\.\d{0,18})?(?:[eE][-+]?\d{1,2})?)|(?P<name>[A-Za-zµμΩ_%]{1,30}))"
@@ -94,10 +100,15 @@ def measured_unit(label: str) -> MeasuredUnit:
     ('9.80665 m s-2', 9.80665)
     >>> measured_unit("mV").cf, measured_unit("m/s^2").cf, measured_unit("m s-2").cf
     ('0.001 V', 'm s-2', 'm s-2')
+    >>> measured_unit("g RMS").factor, measured_unit("°/s").si, measured_unit("µε").cf
+    (9.80665, 'rad s-1', '1e-06 1')
     """
     import pint
 
-    text = label.strip().translate(_SUPERSCRIPTS)
+    text = _DEGREES.sub("deg", label.strip().translate(_SUPERSCRIPTS))
+    detected = _DETECTED.fullmatch(text) if len(text) <= _LONGEST_DETECTED else None
+    if detected is not None:
+        text = detected["unit"]
     if text in _OFFSET_LABELS:
         return MeasuredUnit(label, "degree_Celsius", "degree_Celsius", 1.0)
     try:

@@ -66,6 +66,9 @@ def import_files(
     decimal: Annotated[
         str | None, typer.Option(help='Decimal sign of text, "." or ","; else it is found.')
     ] = None,
+    dates: Annotated[
+        str | None, typer.Option(help="Dates such as 02/03/2019: day-first or month-first; else it is found.")
+    ] = None,
     settings: Annotated[
         Path | None,
         typer.Option(help="The same as keys of a TOML file; without it, FILE.toml beside each file."),
@@ -93,5 +96,6 @@ def import_files(
         "masked": [span(text, "masked") for text in masked or ()],
         "delimiter": delimiter,
         "decimal": decimal,
+        "dates": dates,
     }
     import_into(output, files, written, settings, figure, force)

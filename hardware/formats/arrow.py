@@ -13,10 +13,10 @@ import numpy as np
 from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.cells import column_of
+from vibroimpact.hardware.formats.clock_columns import with_time
 from vibroimpact.hardware.formats.labels import split_label
 from vibroimpact.hardware.formats.probe import check_reads, missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
-from vibroimpact.hardware.formats.text import with_time
 
 PARQUET, FEATHER = b"PAR1", b"ARROW1"
 _OLD_FEATHER = b"FEA1"

@@ -6,11 +6,13 @@ import csv
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from itertools import zip_longest
+from dataclasses import replace
+from itertools import pairwise, zip_longest
 from typing import Any
 
 import numpy as np
 
+from vibroimpact.hardware.formats.instants import is_clock, is_date, is_day, read_instants
 from vibroimpact.hardware.formats.table import Column, Floats
 
 # Instruments write these for an input that is beyond its range, or open.
@@ -33,17 +35,13 @@ NOT_A_NUMBER = 9.91e37
 
 # Possessive, for cells of a million digits and a letter.
 _NUMBER = re.compile(r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eEdD][-+]?\d{1,4})?", re.ASCII)
-_DATE = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d{1,18})?)?Z?", re.ASCII)
-_TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,18})?", re.ASCII)
-_DAY = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}", re.ASCII)
 # 29.990,96 and 29,990.96: both signs in one number.
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:\.\d{3})++,\d++|(?:,\d{3})++\.\d++)", re.ASCII)
+# The same, and beside a decimal comma 101.325; 1,234 beside a decimal point may be two cells.
+_POINTS = re.compile(r"[-+]?[1-9]\d{0,2}(?:\.\d{3})++(?:,\d++)?", re.ASCII)
+_COMMAS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:,\d{3})++\.\d++|(?:,\d{3}){2,9})", re.ASCII)
 _LONGEST_QUOTE = 40
-_DAY_SECONDS = 86_400.0
-_HALF_A_DAY = 0.5 * _DAY_SECONDS
-"""Step back of a clock of the day that is a midnight, s; a smaller one is disorder."""
-_NEXT_DAY = np.datetime64("1970-01-02", "ns")
-"""Times of day without a date are those of 1970-01-01."""
+_NONE: Floats = np.empty(0)
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
@@ -51,6 +49,8 @@ def is_number(text: str, decimal: str = ".") -> bool:
 
     >>> is_number("-1.5e3"), is_number("1,5", ","), is_number("1_000"), is_number("abc")
     (True, True, False, False)
+    >>> is_number("101.325", ","), is_number("0.325", ","), is_number("1,234.5"), is_number("1,234")
+    (True, False, True, False)
     """
     return _NUMBER.fullmatch(_with_point(text.strip(), decimal)) is not None
 
@@ -74,42 +74,6 @@ def is_marker(text: str) -> bool:
     return not word or word in OVERRANGE_WORDS or word in MISSING_WORDS
 
 
-def is_date(text: str) -> bool:
-    """Whether a cell is a time of day, with or without its date.
-
-    >>> is_date("2026-07-30 12:00:01.5"), is_date("12:00:01"), is_date("2026"), is_date("2026-07-30")
-    (True, True, False, False)
-    """
-    cell = text.strip()
-    return _DATE.fullmatch(cell) is not None or _TIME_OF_DAY.fullmatch(cell) is not None
-
-
-def is_day(text: str) -> bool:
-    """Whether a cell is a date alone, which says nothing of when a row was sampled.
-
-    >>> is_day("2026-07-30"), is_day("30.07.2026"), is_day("2026.5")
-    (True, True, False)
-    """
-    return _DAY.fullmatch(text.strip()) is not None
-
-
-def date_of(text: str) -> np.datetime64 | None:
-    """Return the instant of a time of day with or without its date; None where it is none.
-
-    >>> str(date_of("2026/07/30 20:07:43.5")), date_of("2026/13/30 20:07"), date_of("today")
-    ('2026-07-30T20:07:43.500000000', None, None)
-    """
-    cell = text.strip()
-    if not is_date(cell):
-        return None
-    if _TIME_OF_DAY.fullmatch(cell):
-        cell = f"1970-01-01T{cell.replace(',', '.').zfill(len(cell) + (cell[1] == ':'))}"
-    try:
-        return np.datetime64(cell.rstrip("Z").replace("/", "-").replace(" ", "T"), "ns")
-    except ValueError:
-        return None
-
-
 def split_line(line: str, delimiter: str | None) -> list[str]:
     """Return the cells of a line; None splits at blanks."""
     if delimiter is None:
@@ -123,22 +87,54 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
     return [cell.strip().strip('"') for cell in line.split(delimiter)]
 
 
-def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> list[Column]:
+def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str, dates: str = "") -> list[Column]:
     """Return the columns of rows of cells, without labels, each up to its last cell that is not empty.
 
-    Cells are separated by the delimiter, by blanks where it is None.
+    Cells are separated by the delimiter, by blanks where it is None. `dates` is the order of day and month; empty: it
+    is found. A column of days beside one of times of day gives them their dates, and is empty.
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
         return [column_of("", values) for values in quick]
     rows = [split_line(line, delimiter) for line in lines]
-    return [_read_column(cells, decimal) for cells in zip_longest(*rows, fillvalue="")]
+    written = list(zip_longest(*rows, fillvalue=""))
+    columns = [_read_column(cells, decimal, dates) for cells in written]
+    for place, (days, clock) in enumerate(pairwise(written)):
+        if _are_days(days) and is_clock(_first(clock)):
+            together = _with_days(days, clock, dates)
+            if together is not None:
+                columns[place], columns[place + 1] = (
+                    replace(columns[place], values=_NONE, strange=()),
+                    together,
+                )
+    return columns
+
+
+def _first(cells: Sequence[str]) -> str:
+    """Return the first cell that is not empty."""
+    return next((cell for cell in cells if cell.strip()), "")
+
+
+def _are_days(cells: Sequence[str]) -> bool:
+    """Whether a column has a day in every cell that is not empty."""
+    return is_day(_first(cells)) and all(is_day(cell) for cell in cells if cell.strip())
+
+
+def _with_days(days: Sequence[str], clock: Sequence[str], dates: str) -> Column | None:
+    """Return the instants of days and times of day; None where the times of day alone are clearer."""
+    cells = [f"{day.strip()} {time.strip()}".strip() for day, time in zip(days, clock, strict=True)]
+    column = read_instants(cells, is_marker, dates)
+    known = column.values[np.isfinite(column.values)]
+    is_clear = not column.strange and not column.doubt and len(known) > 1
+    return column if is_clear and bool(np.all(np.diff(known) >= 0.0)) else None
 
 
 def _with_point(text: str, decimal: str) -> str:
     if decimal == ",":
-        return text.replace(".", "x").replace(",", ".")  # a point is no decimal sign there
-    return text
+        if "." in text:  # a point is no decimal sign there
+            text = text.replace(".", "" if _POINTS.fullmatch(text) else "x")
+        return text.replace(",", ".")
+    return text.replace(",", "") if "," in text and _COMMAS.fullmatch(text) else text
 
 
 def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> Floats | None:
@@ -163,6 +159,9 @@ def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Colum
     >>> column.values, column.overrange
     (array([ 1., nan, nan, nan]), array([False,  True, False,  True]))
     """
+    low, high = np.fmin.reduce(values, initial=0.0), np.fmax.reduce(values, initial=0.0)
+    if low >= -OVERRANGE_FROM and high <= OVERRANGE_FROM:
+        return Column(label, values, unit, None, **facts)
     missing = np.isclose(values, NOT_A_NUMBER, rtol=1e-4, atol=0.0)
     overrange = (np.isinf(values) | (np.abs(values) > OVERRANGE_FROM)) & ~missing
     if np.any(overrange | missing):
@@ -170,13 +169,12 @@ def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Colum
     return Column(label, values, unit, overrange if np.any(overrange) else None, **facts)
 
 
-def _read_column(cells: Sequence[str], decimal: str) -> Column:
+def _read_column(cells: Sequence[str], decimal: str, dates: str) -> Column:
     """Read one column up to its last cell that is not empty."""
     length = next((row for row in range(len(cells), 0, -1) if cells[row - 1].strip()), 0)
     cells = cells[:length]
-    first = next((cell for cell in cells if cell.strip()), "")
-    if is_date(first):
-        return _read_dates(cells)
+    if is_date(_first(cells)):
+        return read_instants(cells, is_marker, dates)
     strange: list[tuple[int, str]] = []
     values = np.full(length, np.nan)
     for row, cell in enumerate(cells):
@@ -188,31 +186,3 @@ def _read_column(cells: Sequence[str], decimal: str) -> Column:
         elif not is_marker(cell):
             strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
     return column_of("", values, strange=strange)
-
-
-def _midnights(seconds: Floats) -> Floats:
-    """Return the midnights that a clock of the day has passed up to each row."""
-    there = np.flatnonzero(np.isfinite(seconds))
-    passed = np.zeros(len(seconds))
-    passed[there[1:]] = np.diff(seconds[there]) < -_HALF_A_DAY
-    counted: Floats = np.cumsum(passed)
-    return counted
-
-
-def _read_dates(cells: Sequence[str]) -> Column:
-    """Read dates with times of day as seconds after the first one."""
-    strange: list[tuple[int, str]] = []
-    stamps = np.full(len(cells), np.datetime64("NaT", "ns"))
-    for row, cell in enumerate(cells):
-        stamp = date_of(cell)
-        if stamp is not None:
-            stamps[row] = stamp
-        elif not is_marker(cell):
-            strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
-    known = stamps[~np.isnat(stamps)]
-    if not len(known):
-        return Column("", np.full(len(cells), np.nan), strange=strange)
-    seconds = (stamps - known[0]) / np.timedelta64(1, "ns") * 1e-9
-    if all(stamp < _NEXT_DAY for stamp in known):
-        seconds += _DAY_SECONDS * _midnights(seconds)
-    return Column("", np.asarray(seconds, dtype=np.float64), dated=True, strange=strange)

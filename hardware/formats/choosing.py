@@ -17,6 +17,7 @@ from vibroimpact.hardware.formats.hdf5 import SIGNATURE as HDF5
 from vibroimpact.hardware.formats.hdf5 import is_h5py_there, is_netcdf4, read_hdf5
 from vibroimpact.hardware.formats.labview import SIGNATURE, read_labview
 from vibroimpact.hardware.formats.mat import read_mat
+from vibroimpact.hardware.formats.other_formats import refuse_other_format
 from vibroimpact.hardware.formats.probe import UnreadableError, check_reads, missing_extra
 from vibroimpact.hardware.formats.table import LARGEST_FILE, RawFile
 from vibroimpact.hardware.formats.tdms import read_tdms
@@ -84,7 +85,7 @@ def holds_recording(path: Path) -> bool:
     return is_recording(path)
 
 
-def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFile:
+def read_raw(path: Path, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
     """Read a file of any format known here, one that `check_file` has passed; the rest is for `text.read_text`.
 
     Raises
@@ -120,8 +121,10 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
     for magic, kind in _OTHERS.items():
         if start.startswith(magic):
             raise DatasetError(f"expected a recording, got {kind}. Unpack it, or save it as text first.")
+    refuse_other_format(start)
     content, remarks = _decoded(path.read_bytes())
-    raw = read_labview(content) if content.startswith(SIGNATURE) else read_text(content, delimiter, decimal)
+    is_labview = content.startswith(SIGNATURE)
+    raw = read_labview(content) if is_labview else read_text(content, delimiter, decimal, dates)
     return replace(raw, remarks=[*remarks, *raw.remarks])
 
 

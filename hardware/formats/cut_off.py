@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from vibroimpact.hardware.formats.cells import is_date, is_number, split_line
+from vibroimpact.hardware.formats.cells import is_number, split_line
+from vibroimpact.hardware.formats.instants import is_date
 
 _ROWS_COMPARED = 1000
 _FEWEST_ALIKE = 8
@@ -61,6 +62,8 @@ def without_cut_cells(
             f"the text ends within a row: what is left of it, {_quote(cells[-1])}, is left out"
         ]
     lost = [_LOST if cell else "" for cell in before[len(whole) :]] or [_LOST]
+    if decimal == delimiter:  # quotes tell them apart
+        whole = [f'"{cell}"' for cell in whole]
     kept[-1] = (" " if delimiter is None else delimiter).join([*whole, *lost])
     what = "its last columns count" if alike else f"its last value, {_quote(cells[-1])}, counts"
     return kept, [f"the text ends within a row: {what} as missing"]

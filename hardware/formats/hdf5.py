@@ -22,6 +22,8 @@ from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("units", "unit")
 _CLASS = "MATLAB_class"
+_SPARSE = "MATLAB_sparse"
+"""Attribute of a group of MATLAB that holds the values, rows and columns of a sparse matrix."""
 _READING = LibraryRead("HDF5", (*_UNITS, _CLASS.lower(), "matlab_empty", "class", *sorted(RATES | INTERVALS)))
 _DEEPEST = 16
 _MOST_OBJECTS = 10_000
@@ -88,6 +90,8 @@ def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str
                 remarks.append(f"{label}: {why}")
             else:
                 _read_dataset(name, item, scope, scopes, matlab)
+        elif matlab and _SPARSE in item.attrs:
+            remarks.append(f"{label}: a sparse matrix is left out; save full({name})")
         elif label.count(".") >= _DEEPEST or len(scopes) > _MOST_OBJECTS:
             remarks.append(f"{label}: a group within {_DEEPEST} others is left out")
         elif isinstance(item, h5py.Group) and not _is_around(item, group):

@@ -9,6 +9,9 @@ from vibroimpact.fmus.errors import DatasetError
 
 _WITH_UNIT = re.compile(r"(?P<name>[^\[\](){}<>]*?)\s*[\[({<]\s*(?P<unit>[^\[\](){}<>]*?)\s*[\])}>]\s*")
 _AFTER_SLASH = re.compile(r"(?P<name>[^/]*[^/\s])\s+/\s+(?P<unit>\S.*)")
+_AFTER_IN = re.compile(r"(?P<name>\S.*\S|\S)\s+in\s+(?P<unit>\S{1,20})")
+_NO_UNITS_IN_WORDS = frozenset({"C", "F", "K", "total", "1", "-"})
+"""Words after `in` that are more likely degrees, or none, than the units that they could be."""
 _TIME_NAMES = frozenset(
     {"t", "time", "times", "zeit", "temps", "tempo", "tiempo", "x_value", "seconds", "sec"}
     | {"secs", "timestamp", "timestamps", "elapsed", "elapsed_time", "time_s", "time_sec", "t_s"}
@@ -49,6 +52,13 @@ _MECHANICAL = frozenset(
     }
 )
 
+_PARTS_OF_SECONDS = {
+    **dict.fromkeys(("millis", "millisecond", "milliseconds", "millisekunden", "msec", "msecs"), "ms"),
+    **dict.fromkeys(("micros", "microsecond", "microseconds", "mikrosekunden", "usec", "usecs"), "us"),
+}
+"""Headings that name the instants by their unit."""
+_TIME_WITH_UNIT = re.compile(r"(?P<name>[a-z_]{1,20})_(?P<unit>ms|msec|millis|us|usec|micros|ns|s|sec)")
+
 _TIME_UNITS = frozenset({"s", "ms", "us", "µs", "μs", "ns"})
 
 LONGEST_LABEL = 120
@@ -60,12 +70,17 @@ def split_label(text: str) -> tuple[str, str]:
 
     >>> split_label("acceleration (m/s^2)"), split_label("force / N"), split_label("board")
     (('acceleration', 'm/s^2'), ('force', 'N'), ('board', ''))
+    >>> split_label("Zeit in ms"), split_label("built in 2019")
+    (('Zeit', 'ms'), ('built in 2019', ''))
     """
     label = " ".join(text.strip().strip('"')[:LONGEST_LABEL].split())
     for pattern in (_WITH_UNIT, _AFTER_SLASH):
         match = pattern.fullmatch(label)
         if match is not None:
             return match["name"].strip(), match["unit"].strip()
+    match = _AFTER_IN.fullmatch(label)
+    if match is not None and match["unit"] not in _NO_UNITS_IN_WORDS and is_known_unit(match["unit"]):
+        return match["name"], match["unit"]
     return label, ""
 
 
@@ -85,6 +100,20 @@ def is_time_name(label: str) -> bool:
     (True, True, True, False)
     """
     return re.sub(r"[\s-]+", "_", label.strip().lower()) in _TIME_NAMES
+
+
+def unit_in_time_name(label: str) -> str:
+    """Return the unit that a heading of instants names itself; empty where it is no such heading.
+
+    >>> unit_in_time_name("millis"), unit_in_time_name("timestamp_ms"), unit_in_time_name("force_ms")
+    ('ms', 'ms', '')
+    """
+    text = re.sub(r"[\s-]+", "_", label.strip().lower())
+    match = _TIME_WITH_UNIT.fullmatch(text)
+    if match is None or match["name"] not in _TIME_NAMES:
+        return _PARTS_OF_SECONDS.get(text, "")
+    unit = match["unit"]
+    return "s" if unit == "sec" else _PARTS_OF_SECONDS.get(unit, unit)
 
 
 def is_known_unit(label: str) -> bool:

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import date_of, is_marker, is_number, read_cells, split_line
+from vibroimpact.hardware.formats.cells import is_marker, is_number, read_cells, split_line
+from vibroimpact.hardware.formats.clock_columns import with_time
 from vibroimpact.hardware.formats.cut_off import without_cut_cells
+from vibroimpact.hardware.formats.instants import date_of
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in, split_label
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
-from vibroimpact.hardware.formats.text import columns_of, with_time
+from vibroimpact.hardware.formats.text import columns_of
 
 SIGNATURE = "LabVIEW Measurement"
 _END = "***End_of_Header***"

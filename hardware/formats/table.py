@@ -51,6 +51,8 @@ class Column:
         The cells are dates or times of day, and so instants; the values are s after the first one.
     strange : sequence of (row, text)
         Cells of text that are neither a number nor a known marker; their values are NaN.
+    doubt : str
+        What else the instants may be, in words; a column with a doubt is asked about where it is used.
     """
 
     label: str
@@ -64,6 +66,7 @@ class Column:
     attrs: dict[str, Any] = field(default_factory=dict)
     dated: bool = False
     strange: Sequence[tuple[int, str]] = ()
+    doubt: str = ""
 
 
 @dataclass(frozen=True, slots=True)

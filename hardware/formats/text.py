@@ -12,27 +12,29 @@ import numpy as np
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.cells import (
+    column_of,
     has_thousands,
-    is_date,
-    is_day,
     is_marker,
     is_number,
     read_cells,
     split_line,
 )
-from vibroimpact.hardware.formats.cut_off import without_cut_cells
-from vibroimpact.hardware.formats.labels import (
-    is_known_unit,
-    is_time_name,
-    is_time_unit,
-    seconds_in,
-    split_label,
+from vibroimpact.hardware.formats.clock_columns import (
+    FIRST_WITHOUT_HEADING,
+    in_pairs,
+    with_time,
+    without_count,
 )
+from vibroimpact.hardware.formats.cut_off import without_cut_cells
+from vibroimpact.hardware.formats.instants import is_date, is_day
+from vibroimpact.hardware.formats.instruments import instrument_of
+from vibroimpact.hardware.formats.labels import is_known_unit, is_time_name, is_time_unit, split_label
+from vibroimpact.hardware.formats.long_tables import LONG, read_pieces
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, RawFile, Table
+from vibroimpact.hardware.formats.written_numbers import with_plain_numbers
 
 _COMMENTS = ("#", "%", "//", "!")
-_QUOTED = re.compile(r'"([^"]{1,60})"')
-_FIRST = "column_1"
+_GROUP = re.compile(r"(?<![\d.,:])[1-9]\d{0,2}(?:\.\d{3})++(?![\d.:])")
 _SUMMARIES = frozenset(
     {
         "mean",
@@ -52,12 +54,10 @@ _SUMMARIES = frozenset(
     | {"mittelwert", "mittel", "effektivwert", "standardabweichung", "summe", "anzahl", "moyenne", "somme"}
 )
 """Words before a number that is one of a whole column, in the lines below a table."""
-_COUNTS = frozenset(
-    {"index", "no", "no.", "nr", "nr.", "#", "sample", "samples", "row", "point", "scan", "record"}
-)
-"""Headings of a column that counts the rows."""
 _LINES_TRIED = 60
 _LONGEST_HEADER = 1000
+_LONG_HEAD = 200_000
+"""Characters at the start and in the middle of a long text from which its dialect is found."""
 _MOST_STRANGE = 0.01
 DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "blank": None}
 
@@ -86,42 +86,125 @@ class Dialect:
         return any(kinds) and all(kind or is_marker(cell) for kind, cell in zip(kinds, cells, strict=True))
 
 
-def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> RawFile:
-    """Read a table of text; delimiter (None: blanks) and decimal sign are found from the rows where they are empty.
+def read_text(content: str, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
+    """Read a table of text, as its instrument writes it where a form of `dialects/` is recognised.
+
+    Parameters
+    ----------
+    content : str
+    delimiter : str or None
+        Between cells; None: blanks; empty: found from the rows.
+    decimal : str
+        Decimal sign; empty: found from the rows.
+    dates : str
+        `day-first` or `month-first`; empty: found from the dates.
 
     Raises
     ------
     DatasetError
         There are no rows of numbers.
     """
+    content = with_plain_numbers(content)
+    instrument = instrument_of(content)
+    if instrument is not None:
+        content = instrument.prepared(content)
+        form = instrument.form
+        delimiter = DELIMITERS[form.delimiter] if delimiter == "" and form.delimiter else delimiter
+        decimal = decimal or form.decimal
+    parsed = _parsed(content, delimiter, decimal, dates)
+    if instrument is None:
+        columns, remarks = [column for column in parsed.columns if len(column.values)], parsed.remarks
+        tables = _tables(columns)
+    else:
+        columns, more = instrument.described(parsed.columns)
+        remarks = parsed.remarks + more
+        tables = instrument.tables(columns) or _tables(columns)
+    names = {mark: f"{word}s" for word, mark in DELIMITERS.items()}
+    maker = "" if instrument is None else f"{instrument.form.maker}, "
+    cells = names.get(parsed.dialect.delimiter, repr(parsed.dialect.delimiter))
+    comma = ", decimal comma" if parsed.dialect.decimal == "," else ""
+    written = f"{maker}text, cells between {cells}{comma}"
+    return RawFile(written, tables, remarks + _remarks_on(tables))
+
+
+@dataclass(frozen=True, slots=True)
+class _Parsed:
+    """How rows are written, all columns with names and units, those without cells too, and remarks."""
+
+    dialect: Dialect
+    columns: list[Column]
+    remarks: list[str]
+
+
+def _parsed(content: str, delimiter: str | None, decimal: str, dates: str) -> _Parsed:
+    """Return the columns of a text by the general rules."""
+    long = _parsed_in_pieces(content, delimiter, decimal) if len(content) >= LONG else None
+    if long is not None:
+        return long
     lines = content.splitlines()
     dialect, remarks = find_dialect(lines, delimiter, decimal)
     first = next(place for place, line in enumerate(lines) if _is_plain(line) and dialect.is_row(line))
     body = [(place, line) for place, line in enumerate(lines[first:], first) if _is_plain(line)]
-    body, summary = _without_summary(body, dialect)
+    body, summary = _without_footer(body, dialect)
     rows, dropped = _rows(body, dialect)
     dropped += summary
     rows, cut = without_cut_cells(rows, content, dialect.delimiter, dialect.decimal)
-    remarks += dropped + cut
-    cells = read_cells(rows, dialect.delimiter, dialect.decimal)
+    remarks += dropped + cut + _grouped(rows, dialect)
+    cells = read_cells(rows, dialect.delimiter, dialect.decimal, dates)
     if len(cells) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")
     labels, units, late = _all_headings(lines[:first], rows, len(cells), dialect.delimiter)
     columns, more = columns_of(cells, labels, units)
-    names = {mark: f"{word}s" for word, mark in DELIMITERS.items()}
-    written = f"text, cells between {names.get(dialect.delimiter, repr(dialect.delimiter))}"
-    comma = ", decimal comma" if dialect.decimal == "," else ""
-    filled = [column for column in columns if len(column.values)]
-    tables = _pairs(filled) or [without_count(with_time(Table(filled)))]
-    if tables[0].time is not None and tables[0].time.label == _FIRST:
-        more.append(
+    return _Parsed(dialect, columns, remarks + late + more)
+
+
+def _parsed_in_pieces(content: str, delimiter: str | None, decimal: str) -> _Parsed | None:
+    """Return the columns of a long table that has plain numbers alone below its headings; None for another text."""
+    head = content[:_LONG_HEAD].splitlines(keepends=True)[:-1]
+    middle = content.find("\n", len(content) // 2) + 1
+    beyond = content[middle : middle + _LONG_HEAD].splitlines()[:_LINES_TRIED]
+    tried = [line for line in head if _is_plain(line)][:_LINES_TRIED] + list(filter(_is_plain, beyond))
+    try:
+        dialect, remarks = _dialect_of(tried, delimiter, decimal)
+    except DatasetError:
+        return None
+    first = next((at for at, line in enumerate(head) if _is_plain(line) and dialect.is_row(line)), None)
+    if first is None:
+        return None
+    cut: list[str] = []
+
+    def last_lines(lines: list[str]) -> list[str]:
+        rows, said = without_cut_cells(lines, content, dialect.delimiter, dialect.decimal)
+        cut.extend(said)
+        return rows
+
+    begin = sum(map(len, head[:first]))
+    values = read_pieces(content, begin, dialect.delimiter, dialect.decimal, last_lines)
+    if values is None or len(values) > MOST_COLUMNS:
+        return None
+    header = [line.rstrip("\r\n") for line in head[:first]]
+    labels, units = headings(header, len(values), dialect.delimiter)
+    columns, more = columns_of([column_of("", one) for one in values], labels, units)
+    return _Parsed(dialect, columns, remarks + cut + more)
+
+
+def _tables(columns: Sequence[Column]) -> list[Table]:
+    """Return the tables of columns, their instants told apart by the general rules."""
+    return in_pairs(columns) or [without_count(with_time(Table(columns)))]
+
+
+def _remarks_on(tables: Sequence[Table]) -> list[str]:
+    """Say which columns are taken as instants where no heading says so."""
+    remarks = []
+    if tables[0].time is not None and tables[0].time.label == FIRST_WITHOUT_HEADING:
+        remarks.append(
             f"the first column has no heading and ascends: it is taken as the instants ({option('time_column')})"
         )
     if len(tables) > 1:
-        more.append(
+        remarks.append(
             f"{len(tables)} columns have instants, each for those that follow it ({option('time_column')})"
         )
-    return RawFile(written + comma, tables, remarks + late + more)
+    return remarks
 
 
 def _is_plain(line: str) -> bool:
@@ -136,11 +219,16 @@ def find_dialect(
 
     That dialect is chosen in which most lines are rows of one width; of equals the one with more columns.
     """
-    tried = _tried_lines(lines)
-    _refuse_thousands(tried)
+    return _dialect_of(_tried_lines(lines), delimiter, decimal)
+
+
+def _dialect_of(tried: Sequence[str], delimiter: str | None, decimal: str) -> tuple[Dialect, list[str]]:
+    """Return how some lines are written, and remarks on what is doubtful about it."""
     delimiters = DELIMITERS.values() if delimiter == "" else (delimiter,)
     signs = (".", ",") if not decimal else (decimal,)
-    tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign]
+    is_quoted = 2 * sum(line.count('"') > 1 for line in tried) > len(tried)
+    # a comma may be both where quotes tell which it is: "0,002","1,5"
+    tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign or is_quoted]
     best, (count, width) = _best_of(tries, tried)
     if 2 * count < len(tried):  # a column of words may be among the numbers
         lax, (rows, more) = _best_of([replace(dialect, words=True) for dialect in tries], tried)
@@ -151,7 +239,9 @@ def find_dialect(
             "expected rows of numbers, got none. Is it text? "
             f"Give {option('delimiter')} and {option('decimal')} if it is."
         )
-    doubtful = best.delimiter == "," and width == 2 and not any("." in line for line in tried)
+    doubtful = (best.delimiter, best.decimal, width) == (",", ".", 2) and not any(
+        "." in line for line in tried
+    )
     if doubtful and not decimal and not delimiter:
         return best, [
             f"one comma in each row is read as between two columns; if it is decimal, {option('decimal', ',')}"
@@ -159,14 +249,20 @@ def find_dialect(
     return best, []
 
 
-def _refuse_thousands(lines: Sequence[str]) -> None:
-    """Refuse numbers with separators of thousands, where a delimiter that is no such separator shows them."""
-    for line in lines:
-        marks = [mark for mark in ("\t", ";", "|") if mark in line]
-        cells = [cell for mark in marks for cell in split_line(line, mark)] + _QUOTED.findall(line)
-        found = next((cell for cell in cells if has_thousands(cell)), None)
-        if found is not None:
-            raise _thousands(f"the row {line.strip()[:40]!r}", found)
+def _grouped(rows: Sequence[str], dialect: Dialect) -> list[str]:
+    """Say where points are separators of thousands, since commas are decimal."""
+    if dialect.decimal != ",":
+        return []
+    remarks = []
+    if dialect.delimiter == ",":
+        remarks.append(f"commas between quotes are decimal signs ({option('decimal', '.')} if not)")
+    found = next((match for row in rows if "." in row and (match := _GROUP.search(row))), None)
+    if found is not None:
+        remarks.append(
+            f"points in numbers are separators of thousands, since commas are decimal: {found[0]} is "
+            f"{found[0].replace('.', '')}"
+        )
+    return remarks
 
 
 def _thousands(where: str, cell: str) -> DatasetError:
@@ -220,18 +316,44 @@ def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str],
     return [line for place, line in body if place not in skipped], remarks[:5]
 
 
-def _without_summary(
-    body: list[tuple[int, str]], dialect: Dialect
-) -> tuple[list[tuple[int, str]], list[str]]:
-    """Return the lines without those of means, scatter and the like that end a table, and a remark on them."""
+def _without_footer(body: list[tuple[int, str]], dialect: Dialect) -> tuple[list[tuple[int, str]], list[str]]:
+    """Return the lines without those of means, counts and the like that end a table, and a remark on them."""
     end = len(body)
-    while end > 1 and dialect.cells(body[end - 1][1])[0].strip().lower() in _SUMMARIES:
+    while end > 1 and _first_cell(body[end - 1][1], dialect) in _SUMMARIES:
         end -= 1
+    verb = "sum up the table"
+    below = end
+    while below > 1 and _first_cell(body[below - 1][1], dialect)[:1].isalpha():
+        below -= 1
+    if (
+        below < end
+        and _begins_with_number(body[0][1], dialect)
+        and _is_footer(body[below:], len(body), dialect)
+    ):
+        end, verb = below, "stand below the table"
     if end == len(body):
         return body, []
     words = "; ".join(line.strip()[:30] for _, line in body[end:][:3])
     lines = "line" if len(body) == end + 1 else "lines"
-    return body[:end], [f"the last {len(body) - end} {lines} sum up the table and are left out: {words}"]
+    return body[:end], [f"the last {len(body) - end} {lines} {verb} and are left out: {words}"]
+
+
+def _is_footer(lines: Sequence[tuple[int, str]], total: int, dialect: Dialect) -> bool:
+    """Whether lines of words that end a table have numbers, or are many; others are left to `_rows`."""
+    numbers = any(is_number(cell, dialect.decimal) for _, line in lines for cell in dialect.cells(line))
+    return numbers or len(lines) > max(1, _MOST_STRANGE * total)
+
+
+def _first_cell(line: str, dialect: Dialect) -> str:
+    """Return the first cell of a line in lower case; empty for a marker, which may stand in a row."""
+    cell = dialect.cells(line)[0].strip().lower()
+    return "" if is_marker(cell) else cell
+
+
+def _begins_with_number(line: str, dialect: Dialect) -> bool:
+    """Whether a row begins with a number, a time or a day."""
+    cell = dialect.cells(line)[0]
+    return is_number(cell, dialect.decimal) or is_date(cell) or is_day(cell)
 
 
 def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[list[str], list[str]]:
@@ -327,71 +449,10 @@ def columns_of(
                 f"{name}: {len(column.strange)} cells are no numbers and count as missing, the first is "
                 f"{text!r} in row {row + 1}"
             )
-        columns.append(replace(column, label=name, unit=unit or ("s" if column.dated else "")))
+        columns.append(replace(column, label=name, unit="s" if column.dated else unit))
     return columns, remarks
 
 
 def _is_text(column: Column) -> bool:
     """Whether a column is one of words: remarks, names."""
     return 2 * len(column.strange) >= max(1, int(np.isfinite(column.values).sum()) + len(column.strange))
-
-
-def without_count(table: Table) -> Table:
-    """Return the table without a first column that counts its rows, where another one has the instants."""
-    first = table.columns[0] if table.columns and table.time is not None and table.time_place > 0 else None
-    if first is None or first.label.strip().lower() not in _COUNTS or len(table.columns) < 2:
-        return table
-    steps = np.diff(first.values)
-    if not len(steps) or not np.all(steps == 1.0):
-        return table
-    return replace(table, columns=table.columns[1:], time_place=table.time_place - 1)
-
-
-def with_time(table: Table) -> Table:
-    """Return the table with the column of its instants told apart, where one is clear.
-
-    Clear is a heading that means time, or a first column without heading that ascends from row to row and is
-    followed by others.
-    """
-    for place, column in enumerate(table.columns):
-        if column.dated or is_time_name(column.label) or _is_time_by_unit(column, place):
-            return _apart(table, place)
-    if len(table.columns) > 1 and table.columns[0].label == _FIRST and _ascends(table.columns[0]):
-        return _apart(table, 0)
-    return table
-
-
-def _pairs(columns: Sequence[Column]) -> list[Table]:
-    """Return a table for each column of instants with those that follow it, where there are several: `t1 a1 t2 a2`."""
-    clocks = [place for place, column in enumerate(columns) if _is_clock(column)]
-    ends = [*clocks[1:], len(columns)]
-    if (
-        len(clocks) < 2
-        or clocks[0] != 0
-        or any(end - begin < 2 for begin, end in zip(clocks, ends, strict=True))
-    ):
-        return []
-    same = [np.array_equal(columns[0].values, columns[place].values, equal_nan=True) for place in clocks]
-    if all(same):
-        return []
-    return [Table(columns[begin + 1 : end], columns[begin]) for begin, end in zip(clocks, ends, strict=True)]
-
-
-def _is_clock(column: Column) -> bool:
-    """Whether a column has the instants of others: it ascends, and its heading or its unit means time."""
-    name = re.sub(r"[\s_-]*\d{1,3}$", "", column.label)
-    return (column.dated or is_time_name(name) or seconds_in(column.unit) is not None) and _ascends(column)
-
-
-def _apart(table: Table, place: int) -> Table:
-    others = [column for at, column in enumerate(table.columns) if at != place]
-    return replace(table, columns=others, time=table.columns[place], time_place=place) if others else table
-
-
-def _is_time_by_unit(column: Column, place: int) -> bool:
-    return place == 0 and seconds_in(column.unit) is not None and _ascends(column)
-
-
-def _ascends(column: Column) -> bool:
-    values = column.values[np.isfinite(column.values)]
-    return len(values) > 1 and float(np.mean(np.diff(values) >= 0.0)) > 0.99 and bool(values[-1] > values[0])

@@ -25,7 +25,7 @@ _EDGE = re.compile(rb"[ ]{4}-1(?:[\r\n]|[ ]{74}|\Z)")
 _FUNCTION = 58
 _UNITS = 164
 _TIME = 17
-_KINDS = {
+KINDS = {
     0: "a general function",
     1: "a time response",
     2: "an auto spectrum",
@@ -41,7 +41,7 @@ _KINDS = {
 _OVER_TIME = frozenset({0, 1})
 # What the ordinate is, in SI (dataset 164, units code 1); others have a label of their own.
 _SI_UNITS = {8: "m", 9: "N", 11: "m/s", 12: "m/s^2", 13: "N", 15: "Pa", 16: "kg"}
-_DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
+DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 _CUT_OFF = "the file is cut off: its last dataset has no end, and is left out"
 
 
@@ -62,6 +62,23 @@ def read_uff(path: os.PathLike[str] | str) -> RawFile:
     DatasetError
         pyuff is not installed, the file is damaged, or has no function over time.
     """
+    types, datasets, cut = read_datasets(path, frozenset({_FUNCTION, _UNITS}))
+    functions = [found for found in datasets if found["type"] == _FUNCTION]
+    units: Mapping[str, Any] = next((found for found in datasets if found["type"] == _UNITS), {})
+    raw = _sorted_out(functions, units, Counter(types), cut)
+    return replace(raw, damage=_CUT_OFF if cut else "")
+
+
+def read_datasets(
+    path: os.PathLike[str] | str, wanted: frozenset[int]
+) -> tuple[list[int], list[Mapping[str, Any]], bool]:
+    """Return the types of all datasets, those of the wanted types as pyuff reads them, and whether the file is cut off.
+
+    Raises
+    ------
+    DatasetError
+        pyuff is not installed, or the file is damaged.
+    """
     try:
         import pyuff
     except ImportError as problem:
@@ -75,7 +92,7 @@ def read_uff(path: os.PathLike[str] | str) -> RawFile:
             types = [int(kind) for kind in file.get_set_types()]
             if len(types) > 2 * MOST_COLUMNS:
                 raise DatasetError(f"expected at most {2 * MOST_COLUMNS} datasets, got {len(types)}.")
-            datasets = [file.read_sets(at) for at, kind in enumerate(types) if kind in (_FUNCTION, _UNITS)]
+            return types, [file.read_sets(at) for at, kind in enumerate(types) if kind in wanted], cut
     except DatasetError:
         raise
     # the reader gives up on damaged bytes with whatever error they lead to
@@ -84,10 +101,6 @@ def read_uff(path: os.PathLike[str] | str) -> RawFile:
         raise DatasetError(
             f"expected a whole universal file (UFF), got one that cannot be read ({problem}).{besides}"
         ) from problem
-    functions = [found for found in datasets if found["type"] == _FUNCTION]
-    units: Mapping[str, Any] = next((found for found in datasets if found["type"] == _UNITS), {})
-    raw = _sorted_out(functions, units, Counter(types), cut)
-    return replace(raw, damage=_CUT_OFF if cut else "")
 
 
 def _sorted_out(
@@ -104,11 +117,11 @@ def _sorted_out(
         remarks.append(
             f"the units of the file are {units.get('units_description', '')!r}, not SI ({option('unit')})"
         )
-    repeated = Counter(_text(found.get("id1")) for found in functions)
+    repeated = Counter(text_of(found.get("id1")) for found in functions)
     tables: list[Table] = []
     even: list[Column] = []
     for number, found in enumerate(functions, 1):
-        name = _label(found, repeated[_text(found.get("id1"))] > 1) or f"function {number}"
+        name = _label(found, repeated[text_of(found.get("id1"))] > 1) or f"function {number}"
         why = _why_not(found)
         if why:
             remarks.append(f"{name}: {why}, is left out; functions over time are read")
@@ -131,7 +144,8 @@ def _sorted_out(
         what = "; ".join(line.split(";")[0] for line in remarks)[:300]
         raise DatasetError(
             "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type "
-            f"{kinds}{f' ({what})' if what else ''}.{lost}"
+            f"{kinds}{f' ({what})' if what else ''}. In Python, hardware.formats.universal.read_universal reads "
+            f"frequency responses, spectra, shapes and geometry.{lost}"
         )
     return RawFile("universal file (UFF 58)", tables, remarks)
 
@@ -149,7 +163,7 @@ def _why_not(found: Mapping[str, Any]) -> str:
     """Return what a function is that is none over time; empty for one that is."""
     kind = int(found.get("func_type", 0))
     if kind not in _OVER_TIME or found.get("abscissa_spec_data_type") not in (0, 1, _TIME):
-        return _KINDS.get(kind, f"a function of type {kind}") + (
+        return KINDS.get(kind, f"a function of type {kind}") + (
             " over another abscissa" * (kind in _OVER_TIME)
         )
     if np.iscomplexobj(found["data"]):
@@ -163,12 +177,12 @@ def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, F
     """Return a function, and its instants (s) where they are not counted by an increment."""
     declared = int(found.get("num_pts", 0))
     values = np.asarray(found["data"], dtype=np.float64)[: declared or None]
-    unit = _text(found.get("ordinate_axis_units_lab"))
+    unit = text_of(found.get("ordinate_axis_units_lab"))
     if not unit and in_si:
         unit = _SI_UNITS.get(int(found.get("ordinate_spec_data_type", 0)), "")
-    texts = {key: _text(found.get(source)) for key, source in (("function", "id2"), ("date", "id3"))}
+    texts = {key: text_of(found.get(source)) for key, source in (("function", "id2"), ("date", "id3"))}
     attrs = {f"source_{key}": text for key, text in texts.items() if text}
-    second = seconds_in(_text(found.get("abscissa_axis_units_lab"))) or 1.0
+    second = seconds_in(text_of(found.get("abscissa_axis_units_lab"))) or 1.0
     column = column_of(name, values, unit, attrs=attrs)
     if int(found.get("abscissa_spacing", 1)) == 0:
         return column, np.asarray(found["x"], dtype=np.float64)[: len(values)] * second
@@ -179,16 +193,16 @@ def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, F
 
 def _label(found: Mapping[str, Any], with_place: bool) -> str:
     """Return what a function is called: its first line, and its node and direction where that is not enough."""
-    name = _text(found.get("id1"))
+    name = text_of(found.get("id1"))
     if name and not with_place:
         return name
     direction = int(found.get("rsp_dir", 0))
-    sign = _DIRECTIONS.get(abs(direction), "")
+    sign = DIRECTIONS.get(abs(direction), "")
     place = f"{found.get('rsp_node', '')}{sign.replace('+', '-') if direction < 0 else sign}"
-    return f"{name} {_text(found.get('rsp_ent_name'))} {place}".replace("  ", " ").strip()
+    return f"{name} {text_of(found.get('rsp_ent_name'))} {place}".replace("  ", " ").strip()
 
 
-def _text(value: Any) -> str:
+def text_of(value: Any) -> str:
     """Return a text of the file; NONE stands for none."""
     text = str(value or "").strip()
     return "" if text.upper() == "NONE" else text

@@ -24,7 +24,8 @@ def channel_of(
     Samples in the spans of time `masked` (s) are no measurement: they become missing.
     """
     # a row -1 reads the last one here, and is overwritten as missing
-    values = np.where(placement.row < 0, np.nan, column.values[placement.row])
+    values = column.values[placement.row]
+    values[placement.row < 0] = np.nan
     overrange = np.zeros(len(values), dtype=bool)
     if column.overrange is not None:
         overrange = (placement.row >= 0) & column.overrange[placement.row]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.labels import seconds_in
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 from vibroimpact.hardware.recordings.settings import ImportSettings
@@ -24,7 +25,7 @@ def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
     Raises
     ------
     DatasetError
-        A column that the user names is not there.
+        A column that the user names is not there, or the instants may be others.
     """
     tables = list(raw.tables)
     numbered = [column for table in tables for column in _in_file_order(table)]
@@ -32,7 +33,19 @@ def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
         tables = _with_time_column(tables, settings.time_column, numbered)
     if settings.columns:
         tables = _with_columns(tables, settings.columns, numbered)
-    return [_in_seconds(table) for table in tables if table.columns]
+    return [_in_seconds(_beyond_doubt(table, settings)) for table in tables if table.columns]
+
+
+def _beyond_doubt(table: Table, settings: ImportSettings) -> Table:
+    """Return the table without instants that may be others, where a rate replaces them; else ask."""
+    if table.time is None or not table.time.doubt:
+        return table
+    if settings.rate is not None:
+        return replace(table, time=None)
+    raise DatasetError(
+        f"column of instants, {table.time.label!r}: expected dates that can be read in one way, got others: "
+        f"{table.time.doubt}. Give {option('dates', 'day-first')} or {option('dates', 'month-first')}."
+    )
 
 
 def _in_file_order(table: Table) -> list[Column]:

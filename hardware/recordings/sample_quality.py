@@ -43,6 +43,9 @@ def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) ->
     if rails is not None:
         margin = 1e-9 * (rails[1] - rails[0])
         clipped |= (values <= rails[0] + margin) | (values >= rails[1] - margin)
+    # an extreme that does not come again is no limit; sorting millions of samples takes their size four times
+    if max(np.count_nonzero(finite == end) for end in (finite.min(), finite.max())) < FEWEST_CLIPPED:
+        return clipped
     levels, counts = np.unique(finite, return_counts=True)
     if len(levels) < 2 * FEWEST_CLIPPED:
         return clipped

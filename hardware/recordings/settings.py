@@ -117,6 +117,10 @@ class ImportSettings(BaseModel):
         Rule("tab, comma, semicolon, bar or blank"),
     ] = None
     decimal: Annotated[Literal[".", ","] | None, Rule('"." or ","')] = None
+    dates: Annotated[
+        Literal["day-first", "month-first"] | None,
+        Rule("day-first or month-first", hint="02/03/2019 is 2 March with the day first."),
+    ] = None
 
 
 def checked(values: Mapping[str, Any], source: str) -> ImportSettings:

@@ -92,15 +92,29 @@ def _placed(table: Table, column: Column, rate: float | None) -> Placement:
     if rate is not None:
         return _by_rate(rate, column, instants)
     if instants is not None and length > 1:
-        return _by_instants(instants, column, _comparable(table, column), length)
+        heading = "" if table.time is None else table.time.label
+        return _by_instants(instants, column, _comparable(table, column), length, heading)
     if column.interval is not None and np.isfinite(column.interval):
         source = "the sampling interval of the header"
         late = f"{column.label}: by the header it begins at {column.start:.6g} s ({length} samples)"
         return _even(column.start, column.interval, length, source, [late] if column.group else [])
     raise DatasetError(
         f"{column.label}: expected a column of instants or a sampling interval, got neither. "
-        f"Give {option('rate')} (samples per second), or {option('time_column')}."
+        f"Give {option('rate')} (samples per second), or {option('time_column')}. {_columns_tried(table)}"
     )
+
+
+def _columns_tried(table: Table) -> str:
+    """Say which column was tried as instants, and which option takes it."""
+    for number, column in enumerate(table.columns, 1):
+        values = column.values[np.isfinite(column.values)]
+        if len(values) > 1 and bool(np.all(np.diff(values) > 0.0)):
+            return (
+                f"Tried: column {number}, {column.label[:40]!r}, ascends from {values[0]:.6g} to {values[-1]:.6g}, but "
+                f"its heading names no time; {option('time_column', str(number))} takes it as s."
+            )
+    names = ", ".join(repr(column.label[:40]) for column in table.columns[:5])
+    return f"Tried: {names}: no heading names a time, and no column ascends."
 
 
 def _even(
@@ -178,7 +192,9 @@ def _comparable(table: Table, column: Column) -> list[float]:
     return [interval for interval in beside if np.isfinite(interval)]
 
 
-def _by_instants(instants: Floats, column: Column, declared: Sequence[float], length: int) -> Placement:
+def _by_instants(
+    instants: Floats, column: Column, declared: Sequence[float], length: int, heading: str = ""
+) -> Placement:
     """Place the rows by a column of instants, which may end before the column does."""
     known = np.isfinite(instants)
     line = _straight(np.flatnonzero(known), instants[known])
@@ -188,7 +204,7 @@ def _by_instants(instants: Floats, column: Column, declared: Sequence[float], le
         raise DatasetError(
             f"{column.label}: expected an instant for each of {length} rows, got {len(instants)}, unevenly spaced."
         )
-    return _uneven(instants)
+    return _uneven(instants, heading)
 
 
 def _has_few_holes(instants: Floats) -> bool:
@@ -223,11 +239,13 @@ def _straight(count: NDArray[np.intp], instants: Floats) -> _Line | None:
     residual = beyond - beyond.mean() - slope * centred
     digits = digits_of(instants)
     allowed = max(EVEN * interval, _ROUNDED * digits)
-    # a straight line says nothing of two samples, or of instants coarser than all that they cover
-    if slope <= 0.0 or float(np.abs(residual).max()) > allowed or digits * 4.0 > span * interval:
+    worst = float(np.abs(residual).max())
+    # a straight line says nothing of two samples, or of rounded instants coarser than all that they cover
+    is_exact = len(instants) > 2 and worst <= 1e-6 * interval
+    if slope <= 0.0 or worst > allowed or (digits * 4.0 > span * interval and not is_exact):
         return None
     start = float(instants[0] + beyond.mean() - slope * count.mean())
-    if float(np.abs(residual).max()) <= 1e-6 * interval:
+    if worst <= 1e-6 * interval:
         return _Line(float(instants[0] - count[0] * interval), interval, digits)
     return _Line(start, slope, digits, digits > EVEN * interval)
 
@@ -278,9 +296,11 @@ def _line_remarks(line: _Line, instants: Floats, length: int) -> list[str]:
     return remarks
 
 
-def _uneven(instants: Floats) -> Placement:
+def _uneven(instants: Floats, heading: str) -> Placement:
     """Place rows by instants that are not even: gaps, jitter, repetitions, disorder."""
-    row, suspect, remarks = _in_order(instants)
+    row, suspect, remarks = _in_order(
+        instants, f"column of instants{f', {heading[:40]!r}' if heading else ''}"
+    )
     time = instants[row]
     if len(time) < 2:
         return Placement(TimeAxis(time, None, source="the column of instants"), row, suspect, tuple(remarks))
@@ -301,7 +321,7 @@ def _uneven(instants: Floats) -> Placement:
     return replace(placed, row=np.where(placed.row < 0, -1, row[placed.row]))
 
 
-def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
+def _in_order(instants: Floats, title: str) -> tuple[NDArray[np.intp], Flags, list[str]]:
     """Return rows in the order of their instants, each instant once; too much disorder is refused."""
     known = np.flatnonzero(np.isfinite(instants))
     remarks = []
@@ -309,7 +329,7 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
         remarks.append(f"{len(instants) - len(known)} rows without an instant are left out")
     if not len(known):
         raise DatasetError(
-            f"column of instants: expected numbers, got none. Give {option('rate')}, or {option('time_column')}."
+            f"{title}: expected numbers, got none. Give {option('rate')}, or another {option('time_column')}."
         )
     order = known[np.argsort(instants[known], kind="stable")]
     back = int(np.sum(np.diff(instants[known]) < 0.0))
@@ -317,7 +337,7 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
     again = np.append(False, np.diff(instants[order]) == 0.0)
     if back + int(again.sum()) > _MOST_DOUBTFUL * len(known):
         raise DatasetError(
-            f"column of instants: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
+            f"{title}: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
             f"in {len(known)} rows. Give {option('rate')}, or name another {option('time_column')}."
         )
     if back:

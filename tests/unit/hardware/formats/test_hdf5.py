@@ -158,3 +158,16 @@ def test_attributes_of_unusual_kinds_and_circles_of_groups_do_no_harm(tmp_path: 
     assert list(recording.channels) == ["run_acc"]
     assert recording.scalars["whole"].value == 2.0
     assert "nothing: holds no numbers and is left out" in recording.remarks
+
+
+def test_the_indices_of_a_sparse_matrix_are_no_channels(tmp_path: Path) -> None:
+    path = matlab73(tmp_path / "record.mat")
+    with h5py.File(path, "r+") as file:
+        group = file.create_group("stiffness")
+        group.attrs["MATLAB_sparse"], group.attrs["MATLAB_class"] = np.uint64(4), np.bytes_("double")
+        group["data"], group["ir"] = np.arange(1.0, 6.0), np.arange(5, dtype=np.uint64)
+        group["jc"] = np.array([0, 2, 3, 5, 9], dtype=np.uint64)
+    recording = import_recording([path])
+    assert not [name for name in (*recording.channels, *recording.events) if "stiffness" in name]
+    assert "stiffness: a sparse matrix is left out; save full(stiffness)" in recording.remarks
+    assert {"acc_1", "acc_2", "run_force"} <= set(recording.channels)

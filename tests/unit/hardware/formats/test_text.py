@@ -234,18 +234,35 @@ def test_columns_that_begin_later_leave_the_others_their_headings_and_units(tmp_
 
 
 @pytest.mark.parametrize(
-    ("rows", "cell"),
+    ("rows", "values"),
     [
-        (["Zeit;Kraft", "0,0;30.000,00", "0,1;29.990,96", "0,2;850,25"], "30.000,00"),
-        (["t\tF", "0.0\t1,234.5", "0.1\t2,345.5", "0.2\t3.5"], "1,234.5"),
-        (['t,F,"a"', '0.0,"1,234.5",3', '0.1,"2,345.5",3', '0.2,"7.5",3'], "1,234.5"),
-        (["t;F", *[f"{k},5;{k}" for k in range(300)], "300,5;1.234,5"], "1.234,5"),
+        (["Zeit;Kraft", "0,0;30.000,00", "0,1;29.990,96", "0,2;850,25"], [30000.0, 29990.96, 850.25]),
+        (["Zeit;Druck", "0,0;101.325", "0,1;101.326", "0,2;1.101.327"], [101325.0, 101326.0, 1101327.0]),
+        (["t\tF", "0.0\t1,234.5", "0.1\t2,345.5", "0.2\t3.5"], [1234.5, 2345.5, 3.5]),
+        (['t,F,"a"', '0.0,"1,234.5",3', '0.1,"-2,345.5",3', '0.2,"7.5",3'], [1234.5, -2345.5, 7.5]),
+        (["Temps;F", "0,0;3\u202f549,48", "0,1;\u22121\u00a0200,5", "0,2;2 000"], [3549.48, -1200.5, 2000.0]),
+        (['"Zeit","F"', '"0,0","1,5"', '"0,1","-2,5"', '"0,2","1.000,5"'], [1.5, -2.5, 1000.5]),
     ],
 )
-def test_separators_of_thousands_are_named_in_the_refusal(tmp_path: Path, rows: list[str], cell: str) -> None:
+def test_numbers_with_separators_of_thousands_are_read(
+    tmp_path: Path, rows: list[str], values: list[float]
+) -> None:
     path = tmp_path / "thousands.csv"
-    path.write_text("\n".join(rows) + "\n")
-    with pytest.raises(DatasetError, match=f"without separators of thousands, got '{cell}'"):
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    recording = import_recording([path])
+    channel = next(iter(recording.channels.values()))
+    np.testing.assert_array_equal(channel.values, values)
+    assert channel.axis.interval == pytest.approx(0.1)
+    is_doubtful = "separators of thousands, since commas are decimal" in "\n".join(recording.remarks)
+    assert is_doubtful == any(
+        row.count(".") and "," in row and not row.startswith(("0.", "t")) for row in rows
+    )
+
+
+def test_separators_of_thousands_beside_another_decimal_sign_are_named_in_the_refusal(tmp_path: Path) -> None:
+    path = tmp_path / "thousands.csv"
+    path.write_text("\n".join(["t;F", *[f"{k}.5;{k}.5" for k in range(300)], "300.5;1.234,5"]) + "\n")
+    with pytest.raises(DatasetError, match=r"without separators of thousands, got '1\.234,5'"):
         import_recording([path])
 
 
