@@ -123,7 +123,9 @@ class Instrument:
         if self.form.first_column == 1:
             return content
         mark = _MARKS[self.form.delimiter]
-        return "\n".join(self._without_settings(line, mark) for line in content.splitlines()) + "\n"
+        lines = [self._without_settings(line, mark) for line in content.splitlines()]
+        # a text without a final line break may have been cut off
+        return "\n".join(lines) + ("\n" if content.endswith(("\n", "\r")) else "")
 
     def _without_settings(self, line: str, mark: str) -> str:
         cells = line.split(mark)

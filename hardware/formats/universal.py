@@ -172,13 +172,20 @@ def _function(found: Mapping[str, Any]) -> UniversalFunction:
         KINDS.get(kind, f"a function of type {kind}"),
         text_of(found.get("id1")),
         np.asarray(found["x"], dtype=np.float64),
-        values.astype(np.complex128 if np.iscomplexobj(values) else np.float64),
+        _numbers(values),
         text_of(found.get("abscissa_axis_units_lab")),
         text_of(found.get("ordinate_axis_units_lab")),
         text_of(found.get("orddenom_axis_units_lab")),
         _place(found, "rsp"),
         _place(found, "ref"),
     )
+
+
+def _numbers(values: NDArray[Any]) -> Numbers:
+    """Return real or complex numbers in double precision."""
+    if np.iscomplexobj(values):
+        return values.astype(np.complex128)
+    return values.astype(np.float64)
 
 
 def _place(found: Mapping[str, Any], which: str) -> Place:
@@ -200,7 +207,7 @@ def _shape(found: Mapping[str, Any]) -> UniversalShape:
         float(found.get("modal_damp_vis", np.nan)),
         complex(found.get("eig", complex(np.nan, np.nan))),
         np.asarray(found["node_nums"], dtype=np.intp),
-        values.astype(np.complex128 if np.iscomplexobj(values) else np.float64),
+        _numbers(values),
     )
 
 

@@ -137,6 +137,15 @@ def keysight(seed: int) -> Export:
     return _export(lines, data, [f"channel_{at + 1}" for at in range(many)], "V", data.start)
 
 
+def infiniium(seed: int) -> Export:
+    data = drawn(seed, channels=1)
+    lines = [
+        "Revision:,1", "Type:,raw", f"Points:,{data.count}", f"XInc:,{data.interval:+.9E}", f"XOrg:,{data.start:+.9E}",
+        "YUnits:,Volt", "Data:", *(f"{value:.5f}" for value in data.values[0]),
+    ]  # fmt: skip
+    return _export(lines, data, ["data"], "V", data.start)
+
+
 def benchlink(seed: int) -> Export:
     data = drawn(seed, interval=0.1)
     many = len(data.values)
@@ -285,6 +294,7 @@ EXPORTS: dict[str, tuple[str, Callable[[int], Export]]] = {
     "Rigol, counted": ("Rigol", rigol_sequence),
     "Rigol, in seconds": ("Rigol", rigol_seconds),
     "Keysight": ("Keysight", keysight),
+    "Keysight Infiniium": ("Keysight", infiniium),
     "BenchLink": ("Keysight", benchlink),
     "PicoScope": ("PicoScope", picoscope),
     "Saleae": ("Saleae Logic", saleae),

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command_line import in_this_process
 
-from vibroimpact.analysis.recording import Recording
+from vibroimpact.analysis.recording import Recording, open_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
@@ -196,3 +197,15 @@ def test_few_even_samples_are_even(count: int, tmp_path: Path) -> None:
     recording = import_recording(path)
     assert recording.channels["x"].axis.interval == pytest.approx(0.001)
     assert "not evenly spaced" not in "\n".join(recording.remarks)
+
+
+def test_the_command_line_asks_for_the_order_of_dates_and_takes_it(tmp_path: Path) -> None:
+    path, output = tmp_path / "daily.csv", tmp_path / "daily.nc"
+    daily = clocks("%d/%m/%Y %H:%M:%S", datetime(2019, 3, 1, 10), 86_400.0)[:10]
+    path.write_text("Time;x (N)\n" + "".join(f"{day};{at}.5\n" for at, day in enumerate(daily)))
+    asked = in_this_process("import", path, "-o", output)
+    assert asked.returncode == 2
+    assert "--dates day-first or --dates month-first" in " ".join(asked.stderr.split())
+    assert in_this_process("import", path, "-o", output, "--dates", "day-first").returncode == 0
+    assert open_recording(output).channels["x"].axis.interval == pytest.approx(86_400.0)
+    assert in_this_process("import", path, "-o", output, "--dates", "year-first").returncode == 2

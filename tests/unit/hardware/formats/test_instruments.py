@@ -95,3 +95,30 @@ def test_no_signature_takes_long_on_a_text_that_nearly_has_it() -> None:
     for text in hostile:
         assert instrument_of(text + "\n") is None
     assert time.process_time() - started < 2.0
+
+
+def test_a_last_value_that_was_cut_off_counts_as_missing_in_an_export_too(tmp_path: Path) -> None:
+    path = tmp_path / "cut.csv"
+    path.write_text("\n".join(EXPORTS["Tektronix TDS"][1](6).lines)[:-4])
+    recording = import_recording(path)
+    assert np.isnan(recording.channels["ch2"].values[-1])
+    assert "the text ends within a row" in "\n".join(recording.remarks)
+
+
+def test_a_clock_too_coarse_for_its_samples_gives_way_to_the_interval_of_the_header(tmp_path: Path) -> None:
+    lines = ["waveform\t[0]", "t0\t12.03.2019 10:11:12,000", "delta t\t0,000100", "", "time\tY[0]"]
+    values = [f"{0.5 * at:.1f}".replace(".", ",") for at in range(90)]
+    rows = [f"12.03.2019 10:11:12,{at // 10:03d}\t{value}" for at, value in enumerate(values)]
+    path = tmp_path / "fast.txt"
+    path.write_text("\n".join([*lines, *rows]) + "\n")
+    channel = import_recording(path).channels["y_0"]
+    assert channel.axis.interval == pytest.approx(1e-4)
+    np.testing.assert_array_equal(channel.values, 0.5 * np.arange(90))
+
+
+def test_a_scope_that_skips_counts_keeps_its_instants(tmp_path: Path) -> None:
+    lines = ["X,CH1,Start,Increment,", "Sequence,Volt,0.5,1e-3", *(f"{3 * at},{at}.5,," for at in range(50))]
+    path = tmp_path / "skipped.csv"
+    path.write_text("\n".join(lines) + "\n")
+    axis = import_recording(path).channels["ch1"].axis
+    assert (axis.time[0], axis.interval) == (pytest.approx(0.5), pytest.approx(3e-3))
