@@ -128,10 +128,10 @@ class _CountedFrom(MaxNLocator):
         super().__init__(6)
         self._first = first
 
-    def tick_values(self, vmin: float, vmax: float) -> Floats:
+    def tick_values(self, vmin: float, vmax: float) -> list[float]:
         """Return the ticks between two instants."""
-        ticks: Floats = np.asarray(super().tick_values(vmin - self._first, vmax - self._first))
-        return self._first + ticks
+        ticks = super().tick_values(vmin - self._first, vmax - self._first)
+        return [self._first + float(tick) for tick in ticks]
 
 
 def selected(run: int | None) -> dict[str, int]:
