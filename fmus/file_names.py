@@ -17,6 +17,20 @@ def is_text(value: object) -> bool:
     return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
+_DEVICES = frozenset(
+    ("con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10)))
+)
+
+
+def is_device(name: str) -> bool:
+    """Return whether Windows takes the name of a file for one of its devices, whatever ending it has.
+
+    >>> is_device("con.nc"), is_device("LPT1.tar.gz"), is_device("console.nc")
+    (True, True, False)
+    """
+    return name.partition(".")[0].rstrip(" ").lower() in _DEVICES
+
+
 def refuse_no_text(path: str | os.PathLike[str]) -> None:
     """Refuse the name of a file or folder that is no text, as one from a system with another encoding.
 

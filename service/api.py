@@ -38,7 +38,7 @@ def application(store: Store, supervisor: Supervisor, shelf: Shelf, sessions: Se
     answer_problems(app)
 
     @app.get("/healthz", response_class=PlainTextResponse, summary="Whether the service answers")
-    def healthz() -> str:
+    async def healthz() -> str:  # without a thread: it answers when all are busy
         return "ok\n"
 
     @app.get("/metrics", response_class=PlainTextResponse, responses=problems(), summary="For Prometheus")

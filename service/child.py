@@ -14,6 +14,8 @@ from typing import Any
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a disk, a quota or a limit of files that is full; they pass."""
+SHORT = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOBUFS)
+"""Errors of a process or system without free descriptors or memory; they pass."""
 
 
 def say(**what: Any) -> None:

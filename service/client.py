@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from urllib.parse import quote
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service.ownership import URL_FILE
 from vibroimpact.service.remote import RemoteJob, RemoteRecording, ServiceError
 
 if TYPE_CHECKING:
@@ -36,11 +37,12 @@ class Service:
     Parameters
     ----------
     url : str, optional
-        By default `$VIBROIMPACT_SERVICE`, else `http://127.0.0.1:8737`.
+        By default `$VIBROIMPACT_SERVICE`, else that of the service that runs on the folder, else
+        `http://127.0.0.1:8737`.
     token : str, optional
         By default `$VIBROIMPACT_TOKEN`.
     folder : path, optional
-        Of the service, if it is on this machine: the token is read there.
+        Of the service, if it is on this machine: the token and the address are read there.
 
     Raises
     ------
@@ -62,7 +64,7 @@ class Service:
     ) -> None:
         import httpx  # of the extra `service`; commands that need no client load it not
 
-        base = url or os.environ.get(URL_VARIABLE) or DEFAULT_URL
+        base = url or os.environ.get(URL_VARIABLE) or _url_in(folder) or DEFAULT_URL
         secret = token or _token_in(folder) or os.environ.get(TOKEN_VARIABLE)
         if not secret:
             raise UsageError(
@@ -293,6 +295,19 @@ def _token_in(folder: str | os.PathLike[str] | None) -> str:
         raise UsageError(f"{path}: expected the token of a service, got {error.strerror}.") from None
     except UnicodeDecodeError:
         raise UsageError(f"{path}: expected the token of a service, got no text.") from None
+
+
+def _url_in(folder: str | os.PathLike[str] | None) -> str:
+    """Return the address that a service has written into its folder; empty where none runs there."""
+    if folder is None:
+        return ""
+    path = Path(folder, URL_FILE)
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except FileNotFoundError:
+        return ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: expected the address of a service, got {error}. Delete it.") from None
 
 
 def _blocks(file: BinaryIO, size: int) -> Iterator[bytes]:

@@ -9,6 +9,7 @@ from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.service.recordings import refuse_device
 
 MOST_FMUS = 100
 """FMUs that a service keeps."""
@@ -52,6 +53,7 @@ class FmuStore:
         UsageError
             It is no FMU, there are too many, or another one has its name.
         """
+        refuse_device(name)
         try:
             unpack(file)
             read_description(file)

@@ -15,18 +15,16 @@ from vibroimpact.analysis.recording import Recording, write_recording
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.hardware.recordings import import_recording
 from vibroimpact.service.child import FULL, begin_as_child, say
-
-MOST_MEMORY = 8 * 2**30
-"""Address space of the process, byte."""
+from vibroimpact.service.memory import import_memory, machine_memory
 
 
-def limit_memory() -> None:
-    """Let allocations beyond `MOST_MEMORY` fail."""
+def limit_memory(wanted: int) -> None:
+    """Let allocations beyond an address space (byte) fail."""
     if sys.platform == "linux":
         import resource
 
         _, most = resource.getrlimit(resource.RLIMIT_AS)
-        wanted = MOST_MEMORY if most == resource.RLIM_INFINITY else min(MOST_MEMORY, most)
+        wanted = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
         resource.setrlimit(resource.RLIMIT_AS, (wanted, most))
 
 
@@ -44,7 +42,8 @@ def main(arguments: list[str]) -> int:
     """Import the file that the arguments name; return the exit code."""
     file, target, settings = Path(arguments[0]), Path(arguments[1]), json.loads(arguments[2])
     begin_as_child()
-    limit_memory()
+    memory = import_memory(machine_memory())
+    limit_memory(memory)
     try:
         recording = import_recording(file, settings)
         write_recording(recording, target)
@@ -52,7 +51,7 @@ def main(arguments: list[str]) -> int:
     except VibroimpactError as error:
         say(failed=str(error).replace(f"{file.parent}/", ""))  # its folder is the service's own matter
     except MemoryError:
-        say(failed=f"{file.name}: expected a recording, got more than fits into {MOST_MEMORY >> 30} GiB.")
+        say(failed=f"{file.name}: expected a recording, got more than fits into {memory / 2**30:.0f} GiB.")
     except OSError as error:
         if error.errno not in FULL:
             raise

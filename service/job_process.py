@@ -11,6 +11,7 @@ import socket
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign,
 from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
-from vibroimpact.service.child import FULL, begin_as_child, say
+from vibroimpact.service.child import FULL, SHORT, begin_as_child, say
 
 SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
 """Seconds between two lines of progress, at least, and part of all points: each becomes an event that is kept."""
@@ -159,6 +160,8 @@ def _passing(error: Exception, folder: Path, scheduler: str | None) -> str:
     """Return in words what hinders a job that may go on later; empty where the job itself is at fault."""
     if _is_full(error, folder):
         return "waits for room on the disk"
+    if any(isinstance(one, OSError) and one.errno in SHORT for one in _causes(error)):
+        return "waits for free files and memory of the machine"
     if scheduler and (
         isinstance(error, WorkersGoneError) or (isinstance(error, UsageError) and not _answers(scheduler))
     ):
@@ -166,12 +169,17 @@ def _passing(error: Exception, folder: Path, scheduler: str | None) -> str:
     return ""
 
 
-def _is_full(error: BaseException | None, folder: Path) -> bool:
-    """Return whether the disk is full, as the error says or as a trial shows: errors of workers come without causes."""
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error, and what has led to it."""
     while error is not None:
-        if isinstance(error, OSError) and error.errno in FULL:
-            return True
+        yield error
         error = error.__cause__ or error.__context__
+
+
+def _is_full(error: BaseException, folder: Path) -> bool:
+    """Return whether the disk is full, as the error says or as a trial shows: errors of workers come without causes."""
+    if any(isinstance(one, OSError) and one.errno in FULL for one in _causes(error)):
+        return True
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(bytes(TRIAL_BYTES))

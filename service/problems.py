@@ -13,12 +13,13 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from vibroimpact.service.child import FULL
+from vibroimpact.service.child import FULL, SHORT
 
 _FULL_DATABASE = ("SQLITE_FULL", "SQLITE_IOERR_WRITE", "SQLITE_IOERR_FSYNC", "SQLITE_IOERR_SHMSIZE")
 _HELD_DATABASE = ("SQLITE_BUSY", "SQLITE_LOCKED")
+_SHORT_DATABASE = ("SQLITE_CANTOPEN", "SQLITE_NOMEM", "SQLITE_IOERR_NOMEM")
 RETRY_HELD = 2
-"""Seconds after which a client may ask again that found the database held."""
+"""Seconds after which a client may ask again that found the database held, or the machine short of something."""
 METHODS = ("GET", "POST", "DELETE")
 MEDIA_TYPE = "application/problem+json"
 MOST_PROBLEMS = 50
@@ -51,13 +52,17 @@ def answer(
     status: int, detail: str, headers: Mapping[str, str] | None = None, **members: Any
 ) -> JSONResponse:
     """Return a problem as a response."""
-    content = {
+    return JSONResponse(problem(status, detail) | members, status, dict(headers or {}), MEDIA_TYPE)
+
+
+def problem(status: int, detail: str) -> dict[str, Any]:
+    """Return a problem as it is written."""
+    return {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
         "status": status,
         "detail": shortened(detail),
     }
-    return JSONResponse(content | members, status, dict(headers or {}), MEDIA_TYPE)
 
 
 def shortened(text: str) -> str:
@@ -84,6 +89,20 @@ def is_full(error: Exception) -> bool:
     return isinstance(error, OSError) and error.errno in FULL
 
 
+def is_short(error: Exception) -> bool:
+    """Return whether an error is that of a process or system without free descriptors or memory."""
+    if isinstance(error, sqlite3.Error):
+        return getattr(error, "sqlite_errorname", "").startswith(_SHORT_DATABASE)
+    return isinstance(error, OSError) and error.errno in SHORT
+
+
+def why_later(error: Exception) -> str:
+    """Return what a job waits for that an error hinders; empty where waiting does not help."""
+    if is_full(error):
+        return "waits for room on the disk"
+    return "waits for free files and memory of the machine" if is_short(error) else ""
+
+
 def allowed_methods(request: Request) -> list[str]:
     """Return the methods that some route of an application takes at the path of a request."""
     scope, found = dict(request.scope), set[str]()
@@ -108,6 +127,12 @@ def answer_problems(app: FastAPI) -> None:
             return answer(
                 HTTPStatus.SERVICE_UNAVAILABLE,
                 "expected the database of the service, got one that another program holds. Ask again.",
+                {"Retry-After": str(RETRY_HELD)},
+            )
+        if is_short(error):
+            return answer(
+                HTTPStatus.SERVICE_UNAVAILABLE,
+                "expected free files and memory of the machine, got none. Ask again.",
                 {"Retry-After": str(RETRY_HELD)},
             )
         if not is_full(error):

@@ -14,6 +14,7 @@ from typing import Any
 
 from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.file_names import is_device
 from vibroimpact.fmus.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.store import OUTPUTS, Store
@@ -179,6 +180,14 @@ class RecordingStore:
         return found
 
 
+def refuse_device(name: str) -> None:
+    """Raise UsageError where a name is no file's on Windows."""
+    if is_device(name):
+        raise UsageError(
+            f"name: expected a name that files have on every system, got {name!r}, a device on Windows. Choose another."
+        )
+
+
 def stored_name(name: str) -> str:
     """Return what a recording is called that was uploaded under a name.
 
@@ -186,6 +195,7 @@ def stored_name(name: str) -> str:
     'a0.nc'
     """
     stored = f"{Path(name).stem}.nc"
+    refuse_device(name)
     if stored in OUTPUTS.values():
         raise UsageError(f"name: expected another name, got {name!r}: {stored} is what jobs write.")
     return stored

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service.connections import KNOWN
+from vibroimpact.service.hosts import Hosts
 from vibroimpact.service.page_files import page_files
 from vibroimpact.service.problems import answer
 from vibroimpact.service.sessions import Sessions
@@ -92,10 +94,12 @@ class Guarded:
     token : str
     sessions : Sessions
         Of its page, which are as good as the token.
+    hosts : Hosts
+        Names by which the service may be asked.
     """
 
-    def __init__(self, app: Application, token: str, sessions: Sessions) -> None:
-        self._app, self._expected, self._sessions = app, f"Bearer {token}".encode(), sessions
+    def __init__(self, app: Application, token: str, sessions: Sessions, hosts: Hosts) -> None:
+        self._app, self._expected, self._sessions, self._hosts = app, token.encode(), sessions, hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
@@ -107,42 +111,47 @@ class Guarded:
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _note(scope, message["status"], time.monotonic() - began)
+                _note(scope, message["status"], time.monotonic() - began, is_known)
                 known = {name for name, _ in message["headers"]}
                 extra = [(name, value) for name, value in HEADERS if name not in known]
                 message["headers"] = [*message["headers"], *extra]
             await send(message)
 
         headers = dict(scope["headers"])
-        if scope["path"] not in OPEN_PATHS and not self._is_known(headers, scope["method"]):
-            refused = answer(
+        is_known = self._is_known(headers, scope["method"])
+        refused = self._refused(scope, headers, is_known)
+        if is_known and (connection := scope.get("extensions", {}).get(KNOWN)):
+            connection["tell"]()
+        await (refused or self._app)(scope, receive, with_headers)
+
+    def _refused(self, scope: Scope, headers: dict[bytes, bytes], is_known: bool) -> Application | None:
+        """Return the refusal of a request by its head alone; None where it is taken."""
+        if why := self._hosts.why_not(headers.get(b"host"), (scope.get("server") or ("",))[0]):
+            return answer(HTTPStatus.MISDIRECTED_REQUEST, why)
+        if scope["path"] not in OPEN_PATHS and not is_known:
+            return answer(
                 HTTPStatus.UNAUTHORIZED,
                 "Authorization: expected Bearer and the token of this service, which is in the file `token` of its "
                 "folder.",
                 {"WWW-Authenticate": "Bearer"},
             )
-            await refused(scope, receive, with_headers)
-            return
         length = headers.get(b"content-length", b"0")
         most = MOST_UPLOADED.get(scope["path"], MOST_BYTES) if scope["method"] == "POST" else MOST_BYTES
-        if not _LENGTH.fullmatch(length) or int(length) > most or b"transfer-encoding" in headers:
-            got = (
-                "a body in chunks" if b"transfer-encoding" in headers else repr(length[:40].decode("latin-1"))
-            )
-            refused = answer(
-                HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-                f"expected a request of at most {most} byte with its Content-Length, got {got}.",
-            )
-            await refused(scope, receive, with_headers)
-            return
-        await self._app(scope, receive, with_headers)
+        if _LENGTH.fullmatch(length) and int(length) <= most and b"transfer-encoding" not in headers:
+            return None
+        got = "a body in chunks" if b"transfer-encoding" in headers else repr(length[:40].decode("latin-1"))
+        return answer(
+            HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+            f"expected a request of at most {most} byte with its Content-Length, got {got}.",
+        )
 
     def _is_known(self, headers: dict[bytes, bytes], method: str) -> bool:
-        given = headers.get(b"authorization", b"")
-        return hmac.compare_digest(given, self._expected) or self._sessions.are_in(headers, method)
+        scheme, _, given = headers.get(b"authorization", b"").partition(b" ")
+        has_token = hmac.compare_digest(given.strip(b" "), self._expected) and scheme.lower() == b"bearer"
+        return has_token or self._sessions.are_in(headers, method)
 
 
-def _note(scope: Scope, status: int, seconds: float) -> None:
+def _note(scope: Scope, status: int, seconds: float, is_known: bool) -> None:
     """Log a request that changes something or is refused; those that look alone are too many."""
     if scope["method"] in ("GET", "HEAD") and status < HTTPStatus.BAD_REQUEST:
         return
@@ -150,4 +159,5 @@ def _note(scope: Scope, status: int, seconds: float) -> None:
     client = (scope.get("client") or ("",))[0]
     facts = {"method": scope["method"], "path": scope["path"][:200], "status": status, "client": client}
     level = logging.ERROR if status >= HTTPStatus.INTERNAL_SERVER_ERROR else logging.INFO
-    LOG.log(level, "request", extra=facts | {"job": job[1] if job else "", "seconds": round(seconds, 4)})
+    facts |= {"job": job[1] if job else "", "seconds": round(seconds, 4)}
+    LOG.log(level, "request", extra=facts | ({} if is_known else {"alike": f"request {status}"}))

@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import logging
 import socket
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import uvicorn
 
+from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.fmus.wording import option
 from vibroimpact.service.api import application
+from vibroimpact.service.connections import Connections, limited, most_connections
 from vibroimpact.service.fmus import FmuStore
+from vibroimpact.service.hosts import Hosts
 from vibroimpact.service.logs import write_lines
+from vibroimpact.service.ownership import URL_FILE, refuse_foreign_folder
 from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.scenes import Shelf
 from vibroimpact.service.security import Guarded, token_of
 from vibroimpact.service.sessions import Sessions
-from vibroimpact.service.store import DATABASE, Store
+from vibroimpact.service.store import DATABASE, LOG, Store
 from vibroimpact.service.supervisor import Supervisor
 
 BACKLOG = 128
-"""Connections that wait to be taken."""
+"""Connections that wait to be taken, and are taken in one turn of the event loop."""
 LAST_SECONDS = 2
 """For answers that are under way when the service is told to end."""
 
@@ -37,8 +44,9 @@ def serve(
     scheduler: str | None,
     allow_remote: bool,
     allow_fmu_upload: bool = False,
+    names: Sequence[str] = (),
 ) -> None:
-    """Serve until a signal ends it.
+    """Serve until a signal ends it; `names` are names of hosts by which others ask for it.
 
     Raises
     ------
@@ -46,6 +54,7 @@ def serve(
         The folder or the port is taken, or the address is not of this machine alone and nobody allowed that.
     """
     _refuse_remote(host, allow_remote)
+    hosts = Hosts(host, names)
     _make_own(folder)
     with locked_folder(folder, "service"):
         token = token_of(folder)
@@ -57,30 +66,77 @@ def serve(
             supervisor = Supervisor(store, scheduler)
             supervisor.start()
             try:
-                address = f"http://{f'[{host}]' if ':' in host else host}:{listening.getsockname()[1]}"
-                say(f"Serving {folder} on {address}; the token is in {folder / 'token'}.")
-                logging.getLogger("uvicorn.access").disabled = True
-                config = uvicorn.Config(
-                    Guarded(application(store, supervisor, shelf, sessions), token, sessions),
-                    log_config=None,
-                    timeout_graceful_shutdown=LAST_SECONDS,
-                    server_header=False,
-                )
-                uvicorn.Server(config).run(sockets=[listening])
+                port = listening.getsockname()[1]
+                app = Guarded(application(store, supervisor, shelf, sessions), token, sessions, hosts)
+                with _written_url(folder / URL_FILE, _url(reached(host), port)):
+                    say(f"Serving {folder} on {_url(host, port)}; the token is in {folder / 'token'}.")
+                    _Server(app).run(sockets=[listening])
             finally:
                 supervisor.close()
                 store.close()
     say("Stopped. What was running goes on at the next start.")
 
 
+class _Server(uvicorn.Server):
+    """Serves an application on connections that are limited."""
+
+    def __init__(self, app: Guarded) -> None:
+        logging.getLogger("uvicorn.access").disabled = True
+        self._connections = Connections(most_connections())
+        config = uvicorn.Config(
+            app,
+            http=limited(self._connections),
+            ws="none",
+            backlog=BACKLOG,
+            log_config=None,
+            timeout_graceful_shutdown=LAST_SECONDS,
+            server_header=False,
+        )
+        super().__init__(config)
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to listen."""
+        asyncio.get_running_loop().set_exception_handler(self._connections.on_loop_error)
+        await super().startup(sockets)
+
+
 def _make_own(folder: Path) -> None:
     """Make the folder of a service, which nobody else reads; one with other things in it is refused."""
+    refuse_foreign_folder(folder, DATABASE)
     if folder.is_dir() and not (folder / DATABASE).exists() and any(folder.iterdir()):
         raise UsageError(
             f"{folder}: expected the folder of a service, or an empty one, got one with other things in it."
         )
     make_folder(folder)
     folder.chmod(0o700)
+
+
+def reached(host: str) -> str:
+    """Return the address by which this machine reaches a service that listens on an address.
+
+    >>> reached("0.0.0.0"), reached("::"), reached("127.0.0.1")
+    ('127.0.0.1', '::1', '127.0.0.1')
+    """
+    return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+
+
+@contextmanager
+def _written_url(path: Path, url: str) -> Iterator[None]:
+    """Let clients find the address of a service in its folder while it runs; they can be given it otherwise."""
+    try:
+        write_atomically(path, f"{url}\n".encode())
+    except OSError as error:
+        LOG.warning("its address is not written", extra={"why": str(error)})
+        yield
+        return
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def _url(host: str, port: int) -> str:
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}"
 
 
 def _refuse_remote(host: str, allow_remote: bool) -> None:

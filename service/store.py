@@ -175,6 +175,10 @@ class KeyReusedError(Exception):
     """An idempotency key came with another request than the first time."""
 
 
+class QueueFullError(Exception):
+    """As many jobs wait as may wait."""
+
+
 class Store:
     """The jobs of one folder.
 
@@ -249,7 +253,9 @@ class Store:
 
     # ---- jobs ----
 
-    def submit(self, asked: Asked, *, key: str = "", digest: str = "") -> tuple[Job, bool]:
+    def submit(
+        self, asked: Asked, *, key: str = "", digest: str = "", most_queued: int | None = None
+    ) -> tuple[Job, bool]:
         """Accept what was asked for; return its job, and whether it is new.
 
         Parameters
@@ -257,9 +263,13 @@ class Store:
         asked : Asked
         key, digest : str
             Idempotency key and hash of the request; the same pair again is the same job.
+        most_queued : int, optional
+            Jobs that may wait, however many requests come at once.
 
         Raises
         ------
+        QueueFullError
+            As many jobs wait already.
         KeyReusedError
             The key came with another digest before.
         """
@@ -270,6 +280,8 @@ class Store:
                     if known[0] != digest:
                         raise KeyReusedError
                     return self.job(known[1]), False
+            if most_queued is not None and self.counts()[State.queued] >= most_queued:
+                raise QueueFullError
             name = uuid.uuid4().hex
             self._fill(name, asked)
             database.execute(

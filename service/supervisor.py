@@ -7,6 +7,7 @@ ends it; what is known of it is in the store. So a service that is killed and st
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import signal
@@ -23,7 +24,7 @@ from typing import Any, Self
 from vibroimpact.fmus.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.job_process import INTERRUPTED, LATER, Work
-from vibroimpact.service.problems import is_full, is_held
+from vibroimpact.service.problems import is_full, is_held, is_short, why_later
 from vibroimpact.service.store import LOG, LOG_FILE, Job, State, Store
 
 GRACE = 0.5
@@ -34,6 +35,8 @@ IDLE = 0.2
 """Seconds between two looks into an empty queue."""
 PAUSE = 2.0
 """Seconds before something is tried again that a full disk or an absent scheduler hinders."""
+LONGEST_PAUSE = 30.0
+"""Seconds between two attempts at most; each doubles the pause while something hinders all jobs."""
 LAST_LINES = 5
 """Of what a process wrote to its standard error, that a failure is told with."""
 
@@ -53,6 +56,7 @@ class Supervisor:
         self._closing = threading.Event()
         self._lock = threading.Lock()
         self._running: tuple[str, subprocess.Popen[str]] | None = None
+        self._pause = 0.0
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
 
     def start(self) -> None:
@@ -103,12 +107,17 @@ class Supervisor:
         try:
             self._run(job)
         except OSError as error:
-            if is_full(error):
-                LOG.warning("no room on the disk", extra={"job": job.id})
-                self._closing.wait(PAUSE)
-                return
-            # of its folder; the queue goes on with the next
-            self._end(job, State.failed, f"its folder cannot be used: {error}")
+            if why := why_later(error):
+                self._wait_out(f"{why}: {error}", job)
+            else:  # of its folder; the queue goes on with the next
+                self._end(job, State.failed, f"its folder cannot be used: {error}")
+
+    def _wait_out(self, why: str, job: Job) -> None:
+        """Wait before the next attempt while something hinders all jobs, which is logged once."""
+        if not self._pause:
+            LOG.warning("jobs wait", extra={"job": job.id, "why": why})
+        self._pause = min(max(2.0 * self._pause, PAUSE), LONGEST_PAUSE)
+        self._closing.wait(self._pause)
 
     def _run(self, job: Job) -> None:
         started = self._store.change(
@@ -127,12 +136,15 @@ class Supervisor:
             with JobLog(folder / LOG_FILE, job.id) as log:
                 log.write(f"--- {time.strftime('%Y-%m-%d %H:%M:%S')} attempt {job.attempts + 1}")
                 process = self._open(job, folder)
+                self._pause = 0.0
                 with process:  # closes its pipes
                     told = self._listen(job, process, log)
                     code = process.wait()
         except OSError as error:
-            if is_full(error):
-                self._change(job, state=State.queued, message=f"waits for room on the disk: {error}")
+            if why := why_later(error):
+                self._change(job, state=State.queued, message=f"{why}: {error}", attempts=job.attempts)
+            with self._lock:
+                self._running = None
             raise
         with self._lock:
             self._running = None
@@ -170,7 +182,10 @@ class Supervisor:
                 log.write(told.last[-1])
 
         errors = threading.Thread(target=copy_errors, args=(process.stderr,), daemon=True)
-        errors.start()
+        try:
+            errors.start()
+        except RuntimeError as error:  # no thread more: the machine is short of memory or processes
+            raise OSError(errno.ENOMEM, str(error)) from error
         for line in process.stdout:
             said = _said(line)
             total, done = said.get("total"), said.get("done")
@@ -297,7 +312,7 @@ class JobLog:
 
 def _passes(error: sqlite3.Error) -> bool:
     """Return whether what hinders the database may pass by itself."""
-    return is_full(error) or is_held(error)
+    return is_full(error) or is_held(error) or is_short(error)
 
 
 def _said(line: str) -> dict[str, Any]:

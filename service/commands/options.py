@@ -17,12 +17,14 @@ Url = Annotated[
     typer.Option(
         "--service",
         metavar="URL",
-        help="Of the service; by default $VIBROIMPACT_SERVICE, else 127.0.0.1:8737.",
+        help="Of the service; by default $VIBROIMPACT_SERVICE, else that in --data, else 127.0.0.1:8737.",
     ),
 ]
 Folder = Annotated[
     Path | None,
-    typer.Option("--data", help="Folder of the service, which has its token; else $VIBROIMPACT_TOKEN is it."),
+    typer.Option(
+        "--data", help="Folder of the service, which has its token and URL; else $VIBROIMPACT_TOKEN."
+    ),
 ]
 Name = Annotated[str, typer.Argument(help="The id that `submit` printed.", metavar="ID")]
 
@@ -46,6 +48,10 @@ def serve(
     allow_fmu_upload: Annotated[
         bool, typer.Option("--allow-fmu-upload", help="Take FMUs, native code that runs with your rights.")
     ] = False,
+    allow_host: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Name by which others reach it, as through a proxy; repeat it."),
+    ] = None,
 ) -> None:
     """Run the service: campaigns over HTTP, one after the other, resumed after anything.
 
@@ -61,6 +67,7 @@ def serve(
         scheduler=scheduler,
         allow_remote=allow_remote,
         allow_fmu_upload=allow_fmu_upload,
+        names=allow_host or (),
     )
 
 

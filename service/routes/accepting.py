@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import PREFIX, JobAnswer, job_answer
-from vibroimpact.service.store import Asked, KeyReusedError, State, Store
+from vibroimpact.service.store import Asked, KeyReusedError, QueueFullError, Store
 
 MOST_QUEUED = 100
 """Jobs that wait, above which no more are accepted."""
@@ -22,15 +22,15 @@ IdempotencyKey = Annotated[str | None, Header(alias="Idempotency-Key", min_lengt
 
 def accepted(store: Store, asked: Asked, given: BaseModel, response: Response, key: str | None) -> JobAnswer:
     """Accept a job that a request asks for, and say in the response where it is."""
-    if store.counts()[State.queued] >= MOST_QUEUED:
+    digest = hashlib.sha256(f"{type(given).__name__}{given.model_dump_json()}".encode()).hexdigest()
+    try:
+        job, _ = store.submit(asked, key=key or "", digest=digest, most_queued=MOST_QUEUED)
+    except QueueFullError:
         raise ProblemError(
             HTTPStatus.TOO_MANY_REQUESTS,
             f"expected fewer than {MOST_QUEUED} campaigns that wait, got a full queue. Come back later.",
             {"Retry-After": str(RETRY_AFTER)},
-        )
-    digest = hashlib.sha256(f"{type(given).__name__}{given.model_dump_json()}".encode()).hexdigest()
-    try:
-        job, _ = store.submit(asked, key=key or "", digest=digest)
+        ) from None
     except KeyReusedError:
         raise ProblemError(
             HTTPStatus.UNPROCESSABLE_ENTITY,

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from vibroimpact.fmus.errors import SceneError
+from vibroimpact.service.bodies import BoundedRoute
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.accepting import IdempotencyKey, accepted
 from vibroimpact.service.routes.described import (
@@ -57,7 +58,7 @@ class JobPage(BaseModel):
 
 def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIRouter:
     """Return the routes of jobs: submitted, listed, cancelled, resumed, deleted."""
-    router = APIRouter(tags=["campaigns"])
+    router = APIRouter(tags=["campaigns"], route_class=BoundedRoute)
 
     @router.post(
         "/campaigns",

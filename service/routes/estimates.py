@@ -9,6 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from vibroimpact.service.bodies import BoundedRoute
 from vibroimpact.service.estimates import Estimate
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.recordings import RecordingStore
@@ -33,7 +34,7 @@ class EstimateRequest(BaseModel):
 
 def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
     """Return the route that asks for an estimate."""
-    router = APIRouter(tags=["estimates"])
+    router = APIRouter(tags=["estimates"], route_class=BoundedRoute)
 
     @router.post(
         "/estimates",

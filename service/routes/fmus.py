@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import FileResponse
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
@@ -17,6 +16,7 @@ from vibroimpact.service.fmus import NAME, FmuStore
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import PREFIX, problems
 from vibroimpact.service.routes.uploads import Uploads
+from vibroimpact.service.sent_files import SentFile
 
 
 class Component(BaseModel):
@@ -38,21 +38,21 @@ def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
 
     @router.get(
         "/fmus/{name}",
-        response_class=FileResponse,
+        response_class=SentFile,
         responses={
             200: {"content": {"application/zip": {}}},
             206: {"description": "Partial Content"},
-            416: {"description": "Range Not Satisfiable"},
+            **problems(HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE),
             **problems(HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY),
         },
     )
-    def fmu(name: str, fmi: Annotated[Literal["2.0", "3.0"], Query()] = "3.0") -> FileResponse:
+    def fmu(name: str, fmi: Annotated[Literal["2.0", "3.0"], Query()] = "3.0") -> SentFile:
         """Return a component as it is loaded here; `fmi` is for those of the package."""
         path = Path(fmu_path(name, fmi)) if name in components() else fmus.find(name)
         if path is None:
             known = ", ".join([*sorted(components()), *fmus.names()])
             raise ProblemError(HTTPStatus.NOT_FOUND, f"{name}: expected one of {known}.")
-        return FileResponse(path, media_type="application/zip", filename=f"{name.removesuffix('.fmu')}.fmu")
+        return SentFile(path, media_type="application/zip", filename=f"{name.removesuffix('.fmu')}.fmu")
 
     @router.post(
         "/fmus",
@@ -85,7 +85,7 @@ def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
                 "Start it with --allow-fmu-upload.",
             )
         try:
-            async with uploads.received(request, name) as given:
+            async with uploads.received(request, name) as given, uploads.turn:
                 await asyncio.to_thread(fmus.add, given.file, name)
         except UsageError as error:
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import FileResponse
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
@@ -19,6 +18,7 @@ from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.recordings import NAME, RecordingStore, StoredRecording, stored_name
 from vibroimpact.service.routes.described import MOST_PAGE, PREFIX, problems
 from vibroimpact.service.routes.uploads import Upload, Uploads
+from vibroimpact.service.sent_files import SentFile
 
 MOST_SETTINGS = 4000
 """Characters of import settings."""
@@ -108,7 +108,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
         try:
             stored_name(name)
             await asyncio.to_thread(recordings.refuse_more)
-            async with uploads.received(request, name) as given:
+            async with uploads.received(request, name) as given, uploads.turn:
                 found = await asyncio.to_thread(_added, recordings, given, checked)
         except UsageError as error:
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None
@@ -131,19 +131,19 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
 
     @router.get(
         "/recordings/{name}/file",
-        response_class=FileResponse,
+        response_class=SentFile,
         responses={
             200: {"content": {"application/x-netcdf": {}}},
             206: {"description": "Partial Content", "content": {"application/x-netcdf": {}}},
-            416: {"description": "Range Not Satisfiable"},
+            **problems(HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE),
             **absent,
         },
     )
-    def file(name: str) -> FileResponse:
+    def file(name: str) -> SentFile:
         """Return a recording as NetCDF, whole or a range of it."""
         found = known_recording(recordings, name)
         path = file_of(recordings, found)
-        return FileResponse(path, media_type="application/x-netcdf", filename=found.name)
+        return SentFile(path, media_type="application/x-netcdf", filename=found.name)
 
     @router.get("/recordings/{name}/figure", response_class=Response, responses={200: DRAWN, **absent})
     def figure(

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from fastapi.responses import FileResponse, PlainTextResponse
+from fastapi.responses import PlainTextResponse
 
 from vibroimpact.analysis.figures import KINDS
 from vibroimpact.service.drawing import DRAWN, MEDIA, drawn
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import known_job, problems
+from vibroimpact.service.sent_files import SentFile
 from vibroimpact.service.store import LOG_FILE, Job, State, Store
 
 MOST_LOG = 2**20
@@ -64,18 +65,18 @@ def results_router(store: Store) -> APIRouter:
 
     @router.get(
         "/campaigns/{name}/dataset",
-        response_class=FileResponse,
+        response_class=SentFile,
         responses={
             200: {"content": {"application/x-netcdf": {}}},
             206: {"description": "Partial Content", "content": {"application/x-netcdf": {}}},
-            416: {"description": "Range Not Satisfiable"},
+            **problems(HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE),
             **absent,
         },
     )
-    def dataset(name: str) -> FileResponse:
+    def dataset(name: str) -> SentFile:
         """Return the dataset, whole or a range of it."""
         job, path = dataset_of(store, name)
-        return FileResponse(path, media_type="application/x-netcdf", filename=f"{job.id}.nc")
+        return SentFile(path, media_type="application/x-netcdf", filename=f"{job.id}.nc")
 
     @router.get(
         "/campaigns/{name}/figure",

@@ -9,6 +9,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
 from vibroimpact.fmus.errors import SceneError
+from vibroimpact.service.bodies import BoundedRoute
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import problems
 from vibroimpact.service.scenes import Shelf, located, taken_scene
@@ -38,7 +39,7 @@ class Validation(BaseModel):
 
 def scenes_router(shelf: Shelf) -> APIRouter:
     """Return the route that checks a scene."""
-    router = APIRouter(tags=["scenes"])
+    router = APIRouter(tags=["scenes"], route_class=BoundedRoute)
 
     @router.post("/scenes/validate", responses=problems(HTTPStatus.UNPROCESSABLE_ENTITY))
     def validate(given: SceneText) -> Validation:

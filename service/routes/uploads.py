@@ -14,10 +14,11 @@ from pathlib import Path
 from fastapi import Request
 from starlette.requests import ClientDisconnect
 
+from vibroimpact.service.memory import imports_at_once, machine_memory
 from vibroimpact.service.problems import ProblemError
 
-MOST_AT_ONCE = 4
-"""Uploads that are read and imported at a time; others wait for their turn before their bodies are read."""
+MOST_RECEIVED = 16
+"""Uploads whose bodies are received at a time; others wait for their turn before their bodies are read."""
 STALLED_SECONDS = 30.0
 """Silence after which an upload is given up."""
 
@@ -37,11 +38,18 @@ class Uploads:
     ----------
     folder : Path
         Where they lie meanwhile; emptied.
+
+    Attributes
+    ----------
+    turn : asynchronous context manager
+        Of reading what was uploaded: as many at a time as the memory of the machine allows. A body that arrives slowly
+        holds none.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._turns = asyncio.Semaphore(MOST_AT_ONCE)
+        self._receptions = asyncio.Semaphore(MOST_RECEIVED)
+        self.turn = asyncio.Semaphore(imports_at_once(machine_memory()))
 
     @asynccontextmanager
     async def received(self, request: Request, name: str) -> AsyncIterator[Upload]:
@@ -52,7 +60,7 @@ class Uploads:
         ProblemError
             It has stalled, or was cut off.
         """
-        async with self._turns:
+        async with self._receptions:
             with tempfile.TemporaryDirectory(prefix=".upload-", dir=self._folder) as folder:
                 file = Path(folder, name)
                 yield Upload(file, await _written(request, file))

@@ -296,6 +296,21 @@ def test_a_client_without_a_service_or_a_token_is_told(
         service.job("x")
 
 
+def test_a_client_finds_the_address_of_a_service_in_its_folder(
+    served: Served, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("VIBROIMPACT_SERVICE", raising=False)
+    assert (served.folder / "url").read_text(encoding="utf-8") == f"{served.url}\n"
+    done = in_this_process("status", "--data", str(served.folder))
+    assert done.returncode == 0, done.stderr
+    with Service(folder=served.folder) as service:
+        list(service.jobs())
+    (tmp_path / "token").write_text("token", encoding="ascii")
+    (tmp_path / "url").write_bytes(b"\xff")
+    with pytest.raises(UsageError, match="expected the address of a service"):
+        Service(folder=tmp_path)
+
+
 def test_the_commands_of_the_client(served: Served, tmp_path: Path) -> None:
     scene = scene_file(tmp_path, SHORT)
     where = ("--service", served.url, "--data", str(served.folder))

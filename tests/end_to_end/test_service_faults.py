@@ -7,7 +7,7 @@ import random
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -82,6 +82,19 @@ def test_no_event_is_lost_or_doubled_where_connections_are_cut_at_random_bytes(
         assert seen[-1]["done"] == 120
     finally:
         cutter.close()
+
+
+def test_any_number_of_silent_connections_stops_neither_answers_nor_jobs(
+    served: Served, tmp_path: Path
+) -> None:
+    place, before = httpx.URL(served.url), served.log.stat().st_size
+    with ExitStack() as kept, served.client() as service:
+        job = service.submit(scene_file(tmp_path, SHORT), workers=1)
+        for _ in range(700):
+            kept.enter_context(socket.create_connection((place.host, place.port), 20.0))
+        assert httpx.get(f"{served.url}/healthz", timeout=20.0).text == "ok\n"
+        assert job.wait().status["attempts"] == 1
+    assert served.log.stat().st_size - before < 5000
 
 
 @contextmanager

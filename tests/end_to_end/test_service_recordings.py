@@ -163,9 +163,8 @@ def test_uploads_without_an_honest_length_are_refused_or_forgotten(served: Serve
     token = (served.folder / "token").read_text(encoding="utf-8").strip()
     for length, expected in (("999999999999", b" 413 "), ("9" * 5000, b" 4"), ("-1", b" 4"), ("100000", b"")):
         with socket.create_connection((place.host, place.port), 10.0) as connection:
-            head = (
-                f"POST /api/v1/recordings?name=a.txt HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {token}\r\n"
-            )
+            line = "POST /api/v1/recordings?name=a.txt HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+            head = f"{line}Authorization: Bearer {token}\r\n"
             connection.sendall(f"{head}Content-Length: {length}\r\n\r\n0 1\n".encode())
             if not expected:
                 continue  # cut off in the middle

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service import ownership
+from vibroimpact.service.ownership import refuse_foreign_folder
 from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.security import token_of
 from vibroimpact.service.store import DATABASE, LAYOUT, Asked, Kind, State, Store
@@ -31,6 +35,30 @@ def test_what_is_no_token_is_refused(tmp_path: Path, make: Callable[[Path], obje
     (tmp_path / "token").chmod(0o700) if (tmp_path / "token").exists() else None
     with pytest.raises(UsageError, match=f"expected a.* token, got {why}"):
         token_of(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders of users are kept apart by the system itself")
+@pytest.mark.parametrize("foreign", ["", "token", DATABASE, f"{DATABASE}-wal", "jobs", "fmus", "url"])
+def test_a_folder_or_anything_believed_in_it_of_another_user_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, foreign: str
+) -> None:
+    folder = tmp_path / "service"
+    folder.mkdir()
+    path = folder / foreign
+    if foreign:
+        path.touch()
+    (folder / DATABASE).touch()
+    owners = {path: os.geteuid() + 1}
+
+    def status(of: Path) -> object:
+        return SimpleNamespace(st_uid=owners.get(of, os.lstat(of).st_uid))
+
+    refuse_foreign_folder(folder, DATABASE)
+    monkeypatch.setattr(ownership.os, "stat", status)
+    with pytest.raises(
+        UsageError, match=f"{foreign or 'service'}: expected a path of your own, got one of user"
+    ):
+        refuse_foreign_folder(folder, DATABASE)
 
 
 @pytest.mark.parametrize("content", [b"no database" * 1000, b"SQLite format 3\0" + bytes(84) + b"x" * 900])

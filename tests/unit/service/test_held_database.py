@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import sqlite3
 import sys
 import threading
@@ -95,6 +97,31 @@ def test_a_job_is_taken_up_again_after_a_database_that_failed(
         patched.setattr(store, "change", fails)
         assert failed.wait(20.0)  # as the end of the job is noted, or what it said before
     assert until(store, job, State.done).attempts == 2
+
+
+@pytest.mark.usefixtures("supervisor")
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC])
+@pytest.mark.parametrize("place", ["Popen", "JobLog"])
+def test_a_short_machine_delays_jobs_and_is_said_once(
+    store: Store, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, place: str, number: int
+) -> None:
+    refusals = threading.Semaphore(0)
+
+    def refuse(*_: object, **__: object) -> None:
+        refusals.release()
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(module, "LONGEST_PAUSE", 0.05)
+    with monkeypatch.context() as patched, caplog.at_level("WARNING"):
+        patched.setattr(module.subprocess if place == "Popen" else module, place, refuse)
+        jobs = [store.submit(ASKED)[0] for _ in range(3)]
+        for _ in range(6):
+            assert refusals.acquire(timeout=20.0)
+        assert {store.job(job.id).state for job in jobs} <= {State.queued, State.running}
+    assert [record.getMessage() for record in caplog.records].count("jobs wait") == 1
+    for job in jobs:
+        ended = until(store, job, State.done)
+        assert (ended.done, ended.attempts) == (1, 1), "what hinders all jobs is no attempt of one"
 
 
 def test_who_asks_meanwhile_is_told_to_ask_again(store: Store) -> None:

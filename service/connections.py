@@ -1,0 +1,291 @@
+"""Connections of the service: their number, the size of a head, and the time that a request may take to arrive.
+
+Whoever reaches the port can open connections, with or without the token. None of these limits needs to know who it is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import sys
+import time
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from vibroimpact.service.child import SHORT
+from vibroimpact.service.problems import MEDIA_TYPE, problem
+
+MOST_CONNECTIONS = 500
+"""Open connections; one more closes the oldest of a stranger, if there is one without a whole request."""
+MOST_HEAD = 16 * 2**10
+"""Size of request line and headers, byte; a longer head is refused (431)."""
+HEAD_SECONDS = 10.0
+"""Time in which a head arrives whole, s; later the connection is closed."""
+CREDIT_SECONDS = 30.0
+"""Silence, s, after which a body that does not arrive, or an answer that is not read, is given up."""
+LEAST_RATE = 10_000.0
+"""Mean rate of a body, byte/s, below which it uses up the credit of `CREDIT_SECONDS`."""
+SWEEP_SECONDS = 1.0
+"""Time between two looks at all connections, s."""
+DESCRIPTORS = 4096
+"""Open files that the service allows itself, where the system does."""
+RESERVED = 200
+"""Open files that are no connections: database, pipes, files that are sent, connections just taken."""
+FEWEST_CONNECTIONS = 16
+"""Connections that are allowed where the system allows few open files."""
+ROOM = 32
+"""Connections of strangers that are closed when the system has no more open files."""
+SAID_SECONDS = 60.0
+"""Time after which a shortage that lasts is logged again, s."""
+LOG = logging.getLogger("vibroimpact.service")
+KNOWN = "vibroimpact.known"
+"""Extension of an ASGI scope: its `tell` says that the sender of the request has the token."""
+
+
+def most_connections() -> int:
+    """Raise this process's limit of open files as far as allowed; return how many connections fit below it."""
+    if sys.platform == "win32":
+        return MOST_CONNECTIONS
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    allowed = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
+    if soft != resource.RLIM_INFINITY and soft < allowed:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
+        soft = allowed
+    if soft == resource.RLIM_INFINITY:
+        return MOST_CONNECTIONS
+    return min(MOST_CONNECTIONS, max(soft - RESERVED, FEWEST_CONNECTIONS))
+
+
+class Connections:
+    """The open connections of one service, the oldest first.
+
+    Parameters
+    ----------
+    most : int
+        Connections that may be open at a time.
+    """
+
+    def __init__(self, most: int = MOST_CONNECTIONS) -> None:
+        self._most = most
+        self._open: dict[LimitedProtocol, None] = {}
+        self._sweep: asyncio.TimerHandle | None = None
+        self._swept, self._said = 0.0, -SAID_SECONDS
+
+    def __len__(self) -> int:
+        """Return how many are open."""
+        return len(self._open)
+
+    def add(self, connection: LimitedProtocol) -> None:
+        """Add a connection; where it is one too many, close the oldest that can be spared, else this one."""
+        self._open[connection] = None
+        if len(self._open) > self._most:
+            self._close(next(self._spared(connection), connection))
+        if self._sweep is None and self._open:
+            self._swept = time.monotonic()
+            self._sweep = asyncio.get_running_loop().call_later(SWEEP_SECONDS, self._look)
+
+    def discard(self, connection: LimitedProtocol) -> None:
+        """Forget a connection that is closed."""
+        self._open.pop(connection, None)
+
+    def on_loop_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Answer an error of the event loop: where the system is short of open files, strangers make room."""
+        error = context.get("exception")
+        if not (isinstance(error, OSError) and error.errno in SHORT):
+            loop.default_exception_handler(context)
+            return
+        for connection, _ in zip(list(self._spared(None)), range(ROOM), strict=False):
+            self._close(connection)
+        if time.monotonic() - self._said >= SAID_SECONDS:
+            self._said = time.monotonic()
+            LOG.warning("no connection can be taken now", extra={"why": str(error)})
+
+    def _spared(self, new: LimitedProtocol | None) -> Iterator[LimitedProtocol]:
+        """Yield connections that can be closed, without the new one: strangers before those who have the token."""
+        others = [one for one in self._open if one is not new]
+        yield from (one for one in others if not one.is_known and not one.is_whole())
+        yield from (one for one in others if not one.is_known and one.is_whole())
+        yield from (one for one in others if one.is_known and not one.is_whole())
+
+    def _close(self, connection: LimitedProtocol) -> None:
+        self.discard(connection)
+        connection.transport.abort()
+
+    def spend(self, seconds: float) -> None:
+        """Count time that has passed against what each connection waits for; close those that have none left."""
+        for connection in list(self._open):
+            connection.spend(seconds)
+
+    def _look(self) -> None:
+        now = time.monotonic()
+        # what the service itself was late is nobody's fault
+        self.spend(min(now - self._swept, 2.0 * SWEEP_SECONDS))
+        self._sweep, self._swept = None, now
+        if self._open:
+            self._sweep = asyncio.get_running_loop().call_later(SWEEP_SECONDS, self._look)
+
+
+class _BoundedHead(h11.Connection):
+    """Refuses a head above `MOST_HEAD` before it is parsed, however it arrives."""
+
+    is_too_long = False
+
+    def next_event(self) -> Any:
+        """Return the next event.
+
+        Raises
+        ------
+        RemoteProtocolError
+            The head is too long, or no head of HTTP.
+        """
+        if self.their_state is h11.IDLE:
+            waiting, _ = self.trailing_data
+            if len(waiting) > MOST_HEAD and not _ends_in(waiting[:MOST_HEAD]):
+                self.is_too_long = True
+                raise h11.RemoteProtocolError("head too long", HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
+        return super().next_event()
+
+
+def _ends_in(head: bytes) -> bool:
+    """Return whether a head ends within these bytes."""
+    return b"\n\r\n" in head or b"\n\n" in head
+
+
+class LimitedProtocol(H11Protocol):
+    """One connection: its head has a deadline and a size, its body a least rate, its answer a reader."""
+
+    all_open: Connections
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin."""
+        super().connection_made(transport)
+        self.conn = _BoundedHead(h11.SERVER, MOST_HEAD)
+        self.is_known = False
+        self._received = 0
+        self._unsent = 0
+        self._phase: tuple[str, object] = ("head", None)
+        self._left = HEAD_SECONDS
+        self.all_open.add(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End."""
+        self.all_open.discard(self)
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Take what has come."""
+        self._received += len(data)
+        super().data_received(data)
+
+    def handle_events(self) -> None:
+        """Begin the requests that have come."""
+        before = self.cycle
+        super().handle_events()
+        if self.cycle is not before:  # its task has not begun yet
+            self.scope.setdefault("extensions", {})[KNOWN] = {"tell": self._become_known}
+
+    def _become_known(self) -> None:
+        self.is_known = True
+
+    def resume_writing(self) -> None:
+        """Note that the answer is read."""
+        self._left = CREDIT_SECONDS
+        super().resume_writing()
+
+    def is_whole(self) -> bool:
+        """Return whether a request has come whole whose answer is not complete."""
+        return self.conn.their_state not in (h11.IDLE, h11.SEND_BODY) and not self.transport.is_closing()
+
+    def spend(self, seconds: float) -> None:
+        """Count time that has passed against what is waited for; give the connection up when none is left."""
+        phase = (self._waits_for(), self.cycle)
+        if phase != self._phase:
+            self._phase = phase
+            self._left = CREDIT_SECONDS if phase[0] in ("body", "reader") else HEAD_SECONDS
+        earned = self._earned()
+        self._left = min(self._left - seconds + earned, CREDIT_SECONDS)
+        if self._left < 0.0:
+            self._give_up()
+
+    def _waits_for(self) -> str:
+        """Return what the service waits for: the end of a connection, a head, a body, a reader, or itself."""
+        theirs, ours = self.conn.their_state, self.conn.our_state
+        is_answered = theirs is h11.IDLE or ours is h11.DONE or self.transport.is_closing()
+        if self.flow.write_paused or (is_answered and self.transport.get_write_buffer_size()):
+            return "reader"
+        if self.transport.is_closing() or (theirs is h11.SEND_BODY and ours is h11.DONE):
+            return "end"  # the rest of a body is of no use when its answer is complete
+        if theirs is h11.IDLE:
+            return "head"
+        return "body" if theirs is h11.SEND_BODY and not self.flow.read_paused else "itself"
+
+    def _earned(self) -> float:
+        """Return the time that what has come, or was sent, since the last look is worth, s."""
+        received, self._received = self._received, 0
+        unsent = self.transport.get_write_buffer_size()
+        sent, self._unsent = max(self._unsent - unsent, 0), unsent
+        return {
+            "body": received / LEAST_RATE,
+            "reader": sent / LEAST_RATE,
+            "itself": CREDIT_SECONDS,
+        }.get(self._phase[0], 0.0)
+
+    def _give_up(self) -> None:
+        phase = self._phase[0]
+        began = self.conn.their_state is h11.SEND_BODY or bool(self.conn.trailing_data[0])
+        if phase not in ("head", "body") or not began:
+            self.transport.abort()
+            return
+        rule = (
+            f"a head within {HEAD_SECONDS:.0f} s"
+            if phase == "head"
+            else f"a body of {LEAST_RATE / 1000.0:.0f} kB/s or faster"
+        )
+        self._refuse(HTTPStatus.REQUEST_TIMEOUT, f"expected {rule}, got a slower one.")
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what is no request of HTTP."""
+        if isinstance(self.conn, _BoundedHead) and self.conn.is_too_long:
+            status = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
+            self._refuse(status, f"expected a head of at most {MOST_HEAD} byte, got a longer one.")
+        else:
+            self._refuse(HTTPStatus.BAD_REQUEST, "expected a request of HTTP/1.1, got something else.")
+
+    def _refuse(self, status: HTTPStatus, detail: str) -> None:
+        """Answer in place of the application, and close."""
+        if self.cycle is not None:
+            self.cycle.disconnected = True  # what the application would still send is dropped
+            self.cycle.message_event.set()
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
+            self.transport.abort()
+            return
+        body = json.dumps(problem(status, detail)).encode()
+        headers = [
+            ("content-type", MEDIA_TYPE),
+            ("content-length", str(len(body))),
+            ("connection", "close"),
+        ]
+        parts = (
+            h11.Response(status_code=status, headers=headers, reason=status.phrase.encode()),
+            h11.Data(data=body),
+            h11.EndOfMessage(),
+        )
+        for part in parts:
+            self.transport.write(self.conn.send(part) or b"")
+        self.transport.close()
+
+
+def limited(within: Connections) -> type[LimitedProtocol]:
+    """Return the protocol whose connections are counted together."""
+
+    class Limited(LimitedProtocol):
+        all_open = within
+
+    return Limited

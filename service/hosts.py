@@ -1,0 +1,84 @@
+"""Names by which the service may be asked: a page of another name that leads here (DNS rebinding) gets no answer."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from collections.abc import Sequence
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
+
+LOCAL = "localhost"
+_NAME = re.compile(r"[a-z0-9]([a-z0-9\-_.]{0,252}[a-z0-9])?")
+_PORT = re.compile(r":[0-9]{0,5}$")
+
+
+class Hosts:
+    """The hosts of one service: its addresses, `localhost`, and the names that its owner gives it.
+
+    Parameters
+    ----------
+    address : str
+        On which it listens.
+    names : sequence of str
+        Names or addresses by which others reach it, as through a proxy.
+
+    Raises
+    ------
+    UsageError
+        One of them is neither a name nor an address.
+
+    Examples
+    --------
+    >>> hosts = Hosts("127.0.0.1", ["lab.example"])
+    >>> hosts.why_not(b"127.0.0.1:8737", "127.0.0.1"), hosts.why_not(b"LAB.example", "127.0.0.1")
+    ('', '')
+    >>> hosts.why_not(b"evil.example", "127.0.0.1")[:60]
+    "Host: expected 127.0.0.1, lab.example or localhost, got 'evi"
+    """
+
+    def __init__(self, address: str, names: Sequence[str] = ()) -> None:
+        given = [name.strip("[]").rstrip(".").lower() for name in names]
+        for name, said in zip(given, names, strict=True):
+            if not _NAME.fullmatch(name) and _address(name) is None:
+                raise UsageError(
+                    f"{option('allow-host')}: expected a name such as lab.example, without port, got {said!r}."
+                )
+        self._names = sorted({*given, LOCAL, *([] if _is_any(address) else [address.lower()])})
+
+    def why_not(self, host: bytes | None, served: str) -> str:
+        """Return why a request is refused that names a host; empty where it is taken.
+
+        Parameters
+        ----------
+        host : bytes or None
+            The header; browsers always send it, and only they can be misled.
+        served : str
+            Address of this machine that the connection came to.
+        """
+        if host is None:
+            return ""
+        name = _PORT.sub("", host.decode("latin-1")).strip("[]").rstrip(".").lower()
+        address = _address(name)
+        if name in self._names or (address and (address.is_loopback or address == _address(served))):
+            return ""
+        *others, last = self._names
+        return (
+            f"Host: expected {', '.join(others)} or {last}, got {name[:100]!r}. "
+            "Start the service with --allow-host and this name to be asked by it."
+        )
+
+
+def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    try:
+        found = ipaddress.ip_address(name)
+    except ValueError:
+        return None
+    return (found.ipv4_mapped or found) if isinstance(found, ipaddress.IPv6Address) else found
+
+
+def _is_any(address: str) -> bool:
+    """Return whether a service on an address listens on all of the machine."""
+    found = _address(address)
+    return found is not None and found.is_unspecified
