@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -48,17 +49,38 @@ def build_into(output: Path | None) -> None:
         say(str(path))
 
 
-def check_all(files: Sequence[Path]) -> None:
-    """Check FMUs, all of the package if none is named."""
-    from vibroimpact.fmus.packaging.check import check_fmu, kinds_of  # loads fmpy, which an export needs not
+def check_all(files: Sequence[Path], *, strict: bool = False) -> None:
+    """Check FMUs, all of the package if none is named: refusals are raised, doubts and remarks are said.
+
+    Raises
+    ------
+    ComponentFileError
+        An FMU will not run; with `strict`, also one that may run wrong.
+    """
+    # loads fmpy, which an export needs not
+    from vibroimpact.fmus.packaging.check import check_fmu, kinds_of
+    from vibroimpact.fmus.packaging.model_description import Grade
 
     paths = files or [fmu_path(name, version) for name in components() for version in FOLDERS]
-    problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
-    if problems:
-        raise ComponentFileError("\n".join(problems))
+    found = [(path, finding) for path in paths for finding in check_fmu(path)]
+    refusing = (Grade.refused, Grade.doubt) if strict else (Grade.refused,)
+    for path, finding in found:
+        if finding.grade not in refusing:
+            say(f"{path}: {finding.line()}")
+    refused = [f"{path}: {finding.line()}" for path, finding in found if finding.grade in refusing]
+    if refused:
+        raise ComponentFileError("\n".join(refused))
     for path in files:
         say(f"{path}: {kinds_of(path)}")
-    say(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
+    counts = Counter(finding.grade for _, finding in found)
+    doubts, remarks = counts[Grade.doubt], counts[Grade.remark]
+    what = [_counted(doubts, "doubt")] * bool(doubts) + [_counted(remarks, "remark")] * bool(remarks)
+    say(f"{_counted(len(paths), 'FMU')} checked: {', '.join(what) or 'no problems'}.")
+
+
+def _counted(number: int, noun: str) -> str:
+    """Return a number of things in words."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def export_user_law(law: Path | None, output: Path | None, given: Sequence[str]) -> Path:

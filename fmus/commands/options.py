@@ -12,6 +12,8 @@ from typing import Annotated
 
 import typer
 
+#: Help of the option of all commands that read FMUs of other tools.
+STRICT = "Refuse FMUs that may run wrong, instead of saying so."
 commands = typer.Typer(no_args_is_help=True, help="List, build, check and export the FMUs of the package.")
 
 
@@ -47,11 +49,14 @@ def build_components(
 @commands.command("check")
 def check_files(
     files: Annotated[list[Path] | None, typer.Argument(help="FMU files; all of the package if none.")] = None,
+    strict: Annotated[bool, typer.Option("--strict", help=STRICT)] = False,
 ) -> None:
     """Check FMUs: description, binaries, functions, token. Runs their code.
+
+    What will not run is an error, what may run wrong and what is only odd are said.
 
     Example: vibroimpact fmu check Oscillator.fmu
     """
     from vibroimpact.fmus.commands.fmu import check_all
 
-    check_all(files or ())
+    check_all(files or (), strict=strict)

@@ -51,6 +51,8 @@ PARSED_XML = (
     "terminalsAndIcons/terminalsAndIcons.xml",
 )
 BLOCK = 1 << 20
+#: Libraries of another name that a message lists.
+MOST_LIBRARIES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,10 +131,20 @@ def binary_path(fmu: UnpackedFmu) -> Path:
     for name in names:
         if (fmu.folder / "binaries" / name).is_file():
             return fmu.folder / "binaries" / name
+    got, hint = ", ".join(platforms(fmu)) or "no binaries", f"Use an FMU made for {binary_folder('3.0')}."
+    other = [member for folder in folders for member in _libraries(fmu, folder)]
+    if other:
+        got = f"{', '.join(other)}"
+        hint = "Its file and the modelIdentifier of its description must have one name: ask its maker."
     raise ComponentFileError(
-        f"{fmu.source}: expected a binary for this machine (binaries/{names[0]}), "
-        f"got {', '.join(platforms(fmu)) or 'no binaries'}. Use an FMU made for {binary_folder('3.0')}."
+        f"{fmu.source}: expected a binary for this machine (binaries/{names[0]}), got {got}. {hint}"
     )
+
+
+def _libraries(fmu: UnpackedFmu, folder: str) -> list[str]:
+    """Return the libraries that lie in a folder of the binaries, whatever they are called."""
+    files = sorted((fmu.folder / "binaries" / folder).glob(f"*{library_suffix()}"))
+    return [cut(file.relative_to(fmu.folder).as_posix()) for file in files[:MOST_LIBRARIES]]
 
 
 def platforms(fmu: UnpackedFmu) -> tuple[str, ...]:

@@ -1,22 +1,22 @@
-"""Checks an FMU: what FMPy validates, and what that misses.
+"""Checks an FMU: its description as every reader here grades it, and its binaries, which are loaded.
 
-Missed there: the schema lets the attributes of an interface pass whatever their spelling, and nobody looks
-into the binaries. Here every attribute is compared with the schema's own list, every declared binary must
-exist, and the one for this machine is loaded: all functions resolve, and only the described token opens it.
+Every declared binary must exist, and the one for this machine is loaded: all functions resolve, and only the
+described token opens it.
 """
 
 from __future__ import annotations
 
-import difflib
 import json
 import subprocess
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import INTERFACES, UnpackedFmu, binary_path, platforms, unpack
-from vibroimpact.fmus.packaging.fmpy_door import schema_folder, validate
+from vibroimpact.fmus.packaging.fmpy_door import reading_of, schema_folder
+from vibroimpact.fmus.packaging.model_description import Finding, Grade, build_problems
 from vibroimpact.fmus.packaging.platform_names import FMI2_SYSTEMS, SUFFIXES
 from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.safe_xml import root_of
@@ -29,27 +29,27 @@ KINDS = {
     "ModelExchange": "model exchange",
     "ScheduledExecution": "scheduled execution",
 }
-DECLARATION = "{http://www.w3.org/2001/XMLSchema}attribute"
+BUILD_DESCRIPTION = "sources/buildDescription.xml"
 SYSTEM_OF_PREFIX = {prefix: system for system, prefix in FMI2_SYSTEMS.items()}
 
 
-def check_fmu(path: Path) -> tuple[str, ...]:
-    """Return everything that is wrong with an FMU, one line each; empty if nothing is.
+def check_fmu(path: Path) -> tuple[Finding, ...]:
+    """Return everything that is wrong with an FMU, graded, one line each; empty if nothing is.
 
     Its code is run, in a process of its own: a crash there is one more problem here.
     """
     try:
         fmu = unpack(path)
     except ComponentFileError as error:
-        return (str(error).removeprefix(f"{path}: "),)
+        return (Finding(Grade.refused, str(error).removeprefix(f"{path}: ")),)
     # what two interfaces have in common is wrong with each of them
     return tuple(
         dict.fromkeys(
             (
-                *validate(path),
-                *_spelling_problems(fmu),
+                *_description_findings(path),
+                *_archive_remarks(path, fmu),
                 *_missing_binaries(fmu),
-                *_loading_problems(fmu),
+                *_loading_findings(fmu),
             )
         )
     )
@@ -63,14 +63,25 @@ def kinds_of(path: Path) -> str:
     return f"FMI {fmu.fmi_version}: {', '.join(found)}"
 
 
-def _spelling_problems(fmu: UnpackedFmu) -> Iterator[str]:
-    schemas = (schema_folder() / f"fmi{fmu.fmi_version[0]}").glob("*.xsd")
-    known = {e.get("name", "") for path in schemas for e in ElementTree.parse(path).iter(DECLARATION)}
-    for element in _description(fmu).iter():
-        for name in element.attrib.keys() - known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f" Did you mean {near[0]}?" if near else ""
-            yield f"{element.tag}: expected an attribute of FMI {fmu.fmi_version}'s schema, got {name}.{hint}"
+def _description_findings(path: Path) -> tuple[Finding, ...]:
+    try:
+        return reading_of(path).findings
+    except ComponentFileError as error:
+        lines = str(error).splitlines()
+        return tuple(Finding(Grade.refused, line.removeprefix(f"{path}: ")) for line in lines)
+
+
+def _archive_remarks(path: Path, fmu: UnpackedFmu) -> Iterator[Finding]:
+    """Yield what is wrong with members that no run looks at."""
+    with zipfile.ZipFile(path) as archive:
+        members = [member.orig_filename for member in archive.filelist]
+    for name in members:
+        if "\\" in name:
+            yield Finding(Grade.remark, f"{name[:200]}: expected / between the folders of a member, got \\.")
+    build = fmu.folder / BUILD_DESCRIPTION
+    if fmu.fmi_version.startswith("3") and build.is_file():
+        for problem in build_problems(build.read_bytes(), schema_folder()):
+            yield Finding(Grade.remark, f"{BUILD_DESCRIPTION}: {problem}")
 
 
 def _description(fmu: UnpackedFmu) -> ElementTree.Element:
@@ -78,16 +89,15 @@ def _description(fmu: UnpackedFmu) -> ElementTree.Element:
     return root_of(content, f"{fmu.source}: modelDescription.xml")
 
 
-def _missing_binaries(fmu: UnpackedFmu) -> Iterator[str]:
-    present = platforms(fmu)
-    if not present:
-        yield "binaries: expected at least one platform, got none."
-    for platform in present:
+def _missing_binaries(fmu: UnpackedFmu) -> Iterator[Finding]:
+    """Yield the libraries that other machines do not find; the one of this machine is loaded."""
+    for platform in platforms(fmu):
         for identifier in dict.fromkeys(fmu.identifiers):
             binary = fmu.folder / "binaries" / platform / f"{identifier}{_suffix(platform)}"
             if not binary.is_file():
                 name = binary.relative_to(fmu.folder).as_posix()
-                yield f"{name}: expected this file, which the description names, got none."
+                text = f"{name}: expected this file, which the description names, got none."
+                yield Finding(Grade.remark, text)
 
 
 def _suffix(platform: str) -> str:
@@ -96,17 +106,23 @@ def _suffix(platform: str) -> str:
     return SUFFIXES.get(SYSTEM_OF_PREFIX.get(system, system), "")
 
 
-def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
+def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
     try:
         binary = binary_path(fmu)
     except ComponentFileError as error:
-        return (str(error).removeprefix(f"{fmu.source}: "),)
+        return (Finding(Grade.refused, str(error).removeprefix(f"{fmu.source}: ")),)
     root = _description(fmu)
     facts = {
         "binary": str(binary),
         "fmi_version": fmu.fmi_version,
         "token": fmu.token,
-        "interfaces": [tag for tag in INTERFACES if root.find(tag) is not None],
+        "interfaces": [
+            tag
+            for tag in INTERFACES
+            # those of another library than the one that is loaded are not looked into
+            for interface in root.findall(tag)
+            if interface.get("modelIdentifier") == fmu.identifiers[0]
+        ],
         "resources": str(fmu.resources),
         # PythonFMU's binary is the same for all its FMUs, and looks at no token
         "any_token": root.get("generationTool", "").startswith("PythonFMU"),
@@ -115,13 +131,12 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=LOADING_LIMIT)
     except subprocess.TimeoutExpired:
-        return (
-            f"{binary.name}: expected to load and instantiate within {LOADING_LIMIT:g} s, got no answer.",
-        )
+        text = f"expected to load and instantiate within {LOADING_LIMIT:g} s, got no answer."
+        return (Finding(Grade.refused, f"{binary.name}: {text}"),)
     if result.returncode != 0:
         last = result.stderr.strip().splitlines()[-1:] or ["no message"]
-        return (
-            f"{binary.name}: expected to load and instantiate, got exit code {result.returncode}: {last[0]}",
-        )
+        text = f"expected to load and instantiate, got exit code {result.returncode}: {last[0]}"
+        return (Finding(Grade.refused, f"{binary.name}: {text}"),)
     # the FMU may print too: the answer is the last line
-    return tuple(json.loads(result.stdout.splitlines()[-1]))
+    answer = json.loads(result.stdout.splitlines()[-1])
+    return tuple(Finding(Grade[grade], text) for grade, text in answer)

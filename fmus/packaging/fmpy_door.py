@@ -7,11 +7,12 @@ exchange, which this package does not, is FMPy's too.
 from __future__ import annotations
 
 import ctypes.util
-import re
+import io
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.fmus.packaging.model_description import Finding, amended
 
 
 @contextmanager
@@ -41,58 +42,81 @@ with _libraries_of_this_process():
     from fmpy.model_description import (
         ModelDescription,
         ModelVariable,
-        ValidationError,
         read_model_description,
     )
-    from fmpy.validation import validate_fmu
 
-__all__ = ["ModelDescription", "ModelVariable", "integrated", "read_description", "schema_folder", "validate"]
+__all__ = [
+    "ModelDescription",
+    "ModelVariable",
+    "Reading",
+    "integrated",
+    "read",
+    "read_description",
+    "reading_of",
+    "schema_folder",
+]
 
-_PART = r"[A-Za-z_][A-Za-z_0-9]*(\[[0-9]+(,[0-9]+)*\])?"
-PLAIN_NAME = re.compile(rf"{_PART}(\.{_PART})*")
-"""Names that both naming conventions of FMI allow: `contact[1].law`; `der(x)` and quoted ones are left to FMPy."""
+DESCRIPTION = "modelDescription.xml"
 
 
-def read_description(path: Path) -> ModelDescription:
-    """Read and validate the model description of an FMU, after the checks of `archive.unpack`.
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A model description as it was read.
+
+    Attributes
+    ----------
+    description : ModelDescription
+        What FMPy makes of it.
+    findings : tuple of Finding
+        What is wrong with it all the same: remarks, and doubts.
+    """
+
+    description: ModelDescription
+    findings: tuple[Finding, ...]
+
+
+def read(content: bytes) -> Reading:
+    """Read a modelDescription.xml; what breaks FMI's rules is mended where it changes no number, and said.
+
+    Pure: no file is read but FMI's schemas.
 
     Raises
     ------
     ComponentFileError
-        The file is unsafe or its description breaks FMI's rules.
+        It breaks FMI's rules where there is no way round; all problems, one a line.
     """
-    folder = str(unpack(path).folder)
+    mended = amended(content, schema_folder())
+    if mended.refusals:
+        raise ComponentFileError("\n".join(f"{DESCRIPTION}: {text}" for text in mended.refusals))
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as members:
+        members.writestr(DESCRIPTION, mended.content)
     try:
-        return read_model_description(folder)
-    except ValidationError as error:
-        raise ComponentFileError(f"{path}: {'; '.join(error.problems)}") from error
+        return Reading(read_model_description(archive, validate=False), mended.findings)
     except Exception as error:
         # FMPy raises plain Exception for what FMI's schema cannot say
-        raise ComponentFileError(f"{path}: modelDescription.xml: {error}") from error
+        raise ComponentFileError(f"{DESCRIPTION}: {error}") from error
 
 
-def validate(path: Path) -> tuple[str, ...]:
-    """Return what `fmpy validate` finds wrong with an FMU; the file is checked for safety first."""
-    folder = unpack(path).folder
-    with zipfile.ZipFile(path) as archive:
-        members = [member.orig_filename for member in archive.filelist]
-    if any("\\" in member for member in members) or not _has_plain_names(folder):
-        return tuple(validate_fmu(str(path)))
+def reading_of(path: Path) -> Reading:
+    """Read the model description of an FMU, after the checks of `archive.unpack`.
+
+    Raises
+    ------
+    ComponentFileError
+        The file is unsafe or its description breaks FMI's rules where there is no way round.
+    """
+    content = (unpack(path).folder / DESCRIPTION).read_bytes()
     try:
-        read_model_description(str(path), validate_model_structure=True)
-    except ValidationError as error:
-        return tuple(error.problems)
-    except Exception as error:
-        return (str(error),)
-    return ()
+        return read(content)
+    except ComponentFileError as error:
+        lines = str(error).splitlines() or [""]
+        raise ComponentFileError("\n".join(f"{path}: {line}" for line in lines)) from error
 
 
-def _has_plain_names(folder: Path) -> bool:
-    """Return whether all names of variables are legal at a glance; FMPy parses a name in a hundredth of a second."""
-    root = root_of((folder / "modelDescription.xml").read_bytes(), f"{folder.name}: modelDescription.xml")
-    return all(
-        PLAIN_NAME.fullmatch(variable.get("name", "")) for variable in root.iterfind("ModelVariables/*")
-    )
+def read_description(path: Path) -> ModelDescription:
+    """Return the model description of an FMU; see `reading_of`."""
+    return reading_of(path).description
 
 
 def integrated(

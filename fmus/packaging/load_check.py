@@ -1,7 +1,7 @@
 """Loads the binary of an FMU and reports what is wrong with it.
 
 Run as `python -m vibroimpact.fmus.packaging.load_check FACTS`, in a process of its own, since the code of a broken FMU
-may do anything. FACTS is a JSON object; the last line printed is a JSON list of problems.
+may do anything. FACTS is a JSON object; the last line printed is a JSON list of pairs: the name of a grade, and a line.
 """
 
 from __future__ import annotations
@@ -24,6 +24,16 @@ MODEL_EXCHANGE = re.compile(
 )
 CO_SIMULATION = re.compile(r"(?s)Functions for FMI2 for Co-Simulation.*")
 WRONG_TOKEN = "{not the token of any model}"
+#: Functions, without their prefix, without which the importer of this package makes no instance for co-simulation.
+NEEDED = {
+    *("Instantiate", "InstantiateCoSimulation", "FreeInstance", "SetupExperiment", "EnterInitializationMode"),
+    *("ExitInitializationMode", "Terminate", "Reset", "DoStep", "EnterEventMode", "EnterStepMode"),
+    *("UpdateDiscreteStates", "GetFMUstate", "SetFMUstate", "GetFMUState", "SetFMUState"),
+}
+CO_SIMULATION_INTERFACE = "CoSimulation"
+REFUSED, REMARK = "refused", "remark"
+
+Found = tuple[str, str]
 
 Logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 Allocate = CFUNCTYPE(c_void_p, c_size_t, c_size_t)
@@ -43,8 +53,8 @@ class Fmi2Callbacks(Structure):
     )
 
 
-def problems_of(facts: dict[str, Any]) -> Iterator[str]:
-    """Yield what is wrong with a binary.
+def problems_of(facts: dict[str, Any]) -> Iterator[Found]:
+    """Yield what is wrong with a binary: the name of a grade, and a line.
 
     Parameters
     ----------
@@ -56,24 +66,35 @@ def problems_of(facts: dict[str, Any]) -> Iterator[str]:
     try:
         library = CDLL(facts["binary"])
     except OSError as error:
-        yield f"{name}: expected a library that loads, got: {error}."
+        yield REFUSED, f"{name}: expected a library that loads, got: {error}."
         return
     for interface in facts["interfaces"]:
         yield from _problems_of_interface(library, {**facts, "interface": interface})
 
 
-def _problems_of_interface(library: CDLL, facts: dict[str, Any]) -> Iterator[str]:
+def _problems_of_interface(library: CDLL, facts: dict[str, Any]) -> Iterator[Found]:
     name = Path(facts["binary"]).name
+    runs = facts["interface"] == CO_SIMULATION_INTERFACE or CO_SIMULATION_INTERFACE not in facts["interfaces"]
     required = required_functions(facts["fmi_version"], facts["interface"])
     missing = [function for function in required if not hasattr(library, function)]
     if missing:
         version = facts["fmi_version"]
-        yield f"{name}: expected all functions of FMI {version}, got none called {', '.join(missing)}."
-        return
+        # what lacks functions that nothing here calls runs all the same
+        needed = runs and any(function[len("fmi2") :] in NEEDED for function in missing)
+        text = f"{name}: expected all functions of FMI {version}, got none called {', '.join(missing)}."
+        yield REFUSED if needed else REMARK, text
+        if needed or not hasattr(library, instantiating_function(facts)):
+            return
     if not _opens(library, facts, facts["token"]):
-        yield f"{name}: expected an instance for the token of the description, got none."
+        text = f"{name}: expected an instance for the token of the description, got none."
+        yield REFUSED if runs else REMARK, text
     if not facts["any_token"] and _opens(library, facts, WRONG_TOKEN):
-        yield f"{name}: expected no instance for a wrong token, got one: its token is not checked."
+        yield REMARK, f"{name}: expected no instance for a wrong token, got one: its token is not checked."
+
+
+def instantiating_function(facts: dict[str, Any]) -> str:
+    """Return the function that makes an instance of an interface."""
+    return f"fmi3Instantiate{facts['interface']}" if facts["fmi_version"][0] == "3" else "fmi2Instantiate"
 
 
 def required_functions(fmi_version: str, interface: str) -> list[str]:
@@ -92,6 +113,8 @@ def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     instance = (_instantiate3 if major == "3" else _instantiate2)(library, facts, token.encode())
     if not instance:
         return False
+    if not hasattr(library, f"fmi{major}FreeInstance"):
+        return True
     free = library[f"fmi{major}FreeInstance"]
     free.argtypes, free.restype = [c_void_p], None
     free(instance)
@@ -99,7 +122,7 @@ def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
 
 
 def _instantiate3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
-    function = library[f"fmi3Instantiate{facts['interface']}"]
+    function = library[instantiating_function(facts)]
     function.restype = c_void_p
     log = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)(lambda *_: None)
     # an absolute path that ends with a separator

@@ -19,12 +19,18 @@ from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
 
 
 def run_to_folder(
-    scene: Path, output: Path, changes: Sequence[str], workers: int | None, scheduler: str | None
+    scene: Path,
+    output: Path,
+    changes: Sequence[str],
+    workers: int | None,
+    scheduler: str | None,
+    *,
+    strict: bool = False,
 ) -> None:
     """Run a scene's sweep into the folder of a campaign and say what was done."""
     refuse_two_kinds_of_workers(workers, scheduler)
     refuse_system_elsewhere(scene, scheduler)
-    loaded = opened_scene(scene, changes)
+    loaded = opened_scene(scene, changes, strict=strict)
     refuse_folder(output)
     compute(prepared(loaded), output, workers, scheduler)
 

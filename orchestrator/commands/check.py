@@ -36,7 +36,7 @@ _DURATIONS = (
 )
 
 
-def check_scene(path: Path, changes: Sequence[str]) -> None:
+def check_scene(path: Path, changes: Sequence[str], *, strict: bool = False) -> None:
     """Load a scene, compute one point of it, and print what would run and what it would cost.
 
     Raises
@@ -46,7 +46,7 @@ def check_scene(path: Path, changes: Sequence[str]) -> None:
     typer.Exit
         The point failed.
     """
-    scene = with_modes(opened_scene(path, changes))
+    scene = with_modes(opened_scene(path, changes, strict=strict))
     say(f"{path}: no problems")
     _say_aligned(_what_runs(scene))
     cost = cost_of(scene)

@@ -14,7 +14,7 @@ from vibroimpact.analysis.commands.shared_options import FigureFile, Force
 from vibroimpact.fmus.commands.options import commands as fmu_commands
 from vibroimpact.orchestrator.commands.energy_options import register as register_energies
 from vibroimpact.orchestrator.commands.orbit_options import register as register_orbits
-from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
+from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile, Strict
 
 ssp_commands = typer.Typer(no_args_is_help=True, help="Exchange systems of FMUs with other tools.")
 
@@ -32,7 +32,7 @@ def register(app: typer.Typer) -> None:
     register_energies(app)
 
 
-def check(scene: SceneFile, changes: Changes = None) -> None:
+def check(scene: SceneFile, changes: Changes = None, strict: Strict = False) -> None:
     """Say what is wrong with a scene or, where nothing is, what would run and what it would cost.
 
     One point of the scene is computed, the middle one of its sweep, for 20 s at most; times, memory and sizes are
@@ -42,7 +42,7 @@ def check(scene: SceneFile, changes: Changes = None) -> None:
     """
     from vibroimpact.orchestrator.commands.check import check_scene
 
-    check_scene(scene, changes or ())
+    check_scene(scene, changes or (), strict=strict)
 
 
 def run(
@@ -50,6 +50,7 @@ def run(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset to write (.nc).")],
     changes: Changes = None,
     force: Force = False,
+    strict: Strict = False,
 ) -> None:
     """Run a scene in this process, one point after the other, into one dataset.
 
@@ -57,7 +58,7 @@ def run(
     """
     from vibroimpact.orchestrator.commands.run import run_to_dataset
 
-    run_to_dataset(scene, output, changes or (), force)
+    run_to_dataset(scene, output, changes or (), force, strict)
 
 
 def campaign(
@@ -72,6 +73,7 @@ def campaign(
     scheduler: Annotated[
         str | None, typer.Option(help="Use the workers of this Dask scheduler (tcp://host:8786) instead.")
     ] = None,
+    strict: Strict = False,
 ) -> None:
     """Run all points of a scene's sweep with many workers; the same command resumes.
 
@@ -79,7 +81,7 @@ def campaign(
     """
     from vibroimpact.orchestrator.commands.campaign import run_to_folder
 
-    run_to_folder(scene, output, changes or (), workers, scheduler)
+    run_to_folder(scene, output, changes or (), workers, scheduler, strict=strict)
 
 
 def accuracy(

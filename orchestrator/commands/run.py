@@ -19,7 +19,9 @@ from vibroimpact.orchestrator.scene.summary import in_one_line
 from vibroimpact.orchestrator.ssp import opened_scene
 
 
-def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: bool) -> None:
+def run_to_dataset(
+    scene: Path, output: Path, changes: Sequence[str], force: bool, strict: bool = False
+) -> None:
     """Run a scene into a dataset and say what was run and what failed.
 
     Raises
@@ -28,7 +30,7 @@ def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: boo
         The only run failed.
     """
     began = time.perf_counter()
-    loaded = opened_scene(scene, changes)
+    loaded = opened_scene(scene, changes, strict=strict)
     refuse_outputs([scene], output)
     loaded = prepared(loaded)
     refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))

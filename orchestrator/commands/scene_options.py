@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from vibroimpact.fmus.commands.options import STRICT
+
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML), or a system (SSP).")]
+Strict = Annotated[bool, typer.Option("--strict", help=STRICT)]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

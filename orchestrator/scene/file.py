@@ -20,9 +20,10 @@ from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted, s
 
 LARGEST_FILE = 2**20  # bytes; a scene is some hundred lines, and more is most likely another kind of file
 
+_ARCHIVE = b"PK\x03\x04"
 OTHER_KINDS = (
     (
-        b"PK\x03\x04",
+        _ARCHIVE,
         "an archive",
         "An FMU runs as a component of a scene ([component.NAME]); a system's name ends in .ssp.",
     ),
@@ -152,6 +153,8 @@ def _read_bytes(path: Path, source: str) -> bytes:
         ) from None
     for first, kind, hint in OTHER_KINDS:
         if content.startswith(first):
+            if first == _ARCHIVE and path.suffix.lower() == ".ssp":
+                kind, hint = "a system (SSP)", "`vibroimpact.import_ssp` makes a scene of it."
             raise _file_error(source, "a scene file (TOML)", kind, hint)
     if b"\0" in content[:LARGEST_FILE]:
         raise _file_error(source, "a scene file (TOML)", "a file that is no text", "Name a .toml file.")

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene, load_scene
 
@@ -14,9 +14,9 @@ ENDING = ".ssp"
 
 
 def opened_scene(
-    path: str | PathLike[str], changes: Sequence[str] = (), *, for_orbits: bool = False
+    path: str | PathLike[str], changes: Sequence[str] = (), *, for_orbits: bool = False, strict: bool = False
 ) -> Scene:
-    """Return the scene of a file; what a system leaves open is said on standard error.
+    """Return the scene of a file; what a system, or an FMU of it, leaves open is said on standard error.
 
     The FMUs of a system lie unpacked until this process ends.
 
@@ -28,21 +28,41 @@ def opened_scene(
         `KEY=VALUE`, made before anything is checked.
     for_orbits : bool
         Whether a start that is not written may be on a stop: see `scene.parse_scene`.
+    strict : bool
+        Refuse FMUs that may run wrong.
 
     Raises
     ------
     SceneError
-        With all problems of the file, each on one line.
+        With all problems of the file, each on one line; with `strict`, what is assumed of its FMUs too.
     ComponentFileError
         The archive, or an FMU in it, is unsafe or damaged.
     """
     if not is_system(path):
-        return load_scene(path, changes, for_orbits=for_orbits)
-    from vibroimpact.orchestrator.ssp.importing import load_system
+        scene = load_scene(path, changes, for_orbits=for_orbits)
+    else:
+        from vibroimpact.orchestrator.ssp.importing import load_system
 
-    imported = load_system(path, changes)
-    say_notes(imported.notes)
-    return imported.scene
+        imported = load_system(path, changes)
+        say_notes(imported.notes)
+        scene = imported.scene
+    _say_findings(path, scene, strict)
+    return scene
+
+
+def _say_findings(path: str | PathLike[str], scene: Scene, strict: bool) -> None:
+    """Say what is assumed of the FMUs of a scene, or refuse it; count what is only odd."""
+    general = scene.general
+    if general is None:
+        return
+    if strict and general.doubts:
+        raise SceneError([f"{path}: {doubt}" for doubt in general.doubts])
+    say_notes(f"may run wrong: {doubt}" for doubt in general.doubts)
+    say_notes(
+        f"{file}: {count} remark{'s' if count > 1 else ''} on its description, which change no number. "
+        f"`vibroimpact fmu check` shows them."
+        for file, count in general.remarks.items()
+    )
 
 
 def say_notes(notes: Iterable[str]) -> None:

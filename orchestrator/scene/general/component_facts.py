@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from vibroimpact.fmus.packaging.archive import content_hash, unpack
-from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, read_description
+from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, reading_of
+from vibroimpact.fmus.packaging.model_description import Grade
 from vibroimpact.fmus.units import BASE_UNITS, Unit, declared_unit
 from vibroimpact.orchestrator.fmi.capabilities import Capabilities, capabilities_of
 from vibroimpact.orchestrator.scene.problems import nearest
@@ -101,6 +102,10 @@ class ComponentFacts:
         Communication step that it proposes, s.
     capabilities : Capabilities
         What it declares of its co-simulation.
+    doubts : tuple of str
+        What its description leaves open, and what is assumed.
+    remarks : int
+        How much else is odd in its description, and changes no number.
     """
 
     file: str
@@ -109,6 +114,8 @@ class ComponentFacts:
     scheduled: bool
     step: float | None
     capabilities: Capabilities
+    doubts: tuple[str, ...] = ()
+    remarks: int = 0
 
     @property
     def restorable(self) -> bool:
@@ -134,7 +141,8 @@ def component_facts(path: Path) -> ComponentFacts:
 
 @lru_cache(maxsize=_MOST_CACHED)
 def _facts(sha256: str, path: Path) -> ComponentFacts:
-    description: ModelDescription = read_description(path)
+    reading = reading_of(path)
+    description = reading.description
     units = {unit.name: _unit(unit) for unit in description.unitDefinitions}
     variables = {variable.name: _variable(variable, units) for variable in description.modelVariables}
     return ComponentFacts(
@@ -144,6 +152,8 @@ def _facts(sha256: str, path: Path) -> ComponentFacts:
         scheduled=description.scheduledExecution is not None,
         step=_proposed_step(description),
         capabilities=capabilities_of(description, unpack(path).folder),
+        doubts=tuple(finding.text for finding in reading.findings if finding.grade is Grade.doubt),
+        remarks=sum(finding.grade is Grade.remark for finding in reading.findings),
     )
 
 

@@ -178,6 +178,7 @@ def _facts(fmu: Path, where: str, problems: list[Problem]) -> ComponentFacts | N
         other = "scheduled execution" if facts.scheduled else "model exchange"
         hint = f"Export it for co-simulation: {other} is not available in this version."
         problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} for {other} only", hint))
+        return None  # what the scene asks of its variables makes no difference
     for needed in facts.capabilities.refusals:
         expected = (
             "an FMU whose clocks are input clocks of a constant or fixed interval, and that has an event mode"

@@ -99,6 +99,10 @@ class GeneralScene:
         The same of each start value, gain and number of a contact that the scene gives.
     contacts : tuple of StopContactSpec and PairSpec
         In the order of the file.
+    doubts : tuple of str
+        What the descriptions of its FMUs leave open, and what is assumed: `FILE: ...`.
+    remarks : mapping of str to int
+        By the file of an FMU, how much else is odd in its description and changes no number.
     """
 
     components: tuple[ComponentSpec, ...]
@@ -112,6 +116,8 @@ class GeneralScene:
     units: Mapping[str, str]
     start_units: Mapping[str, str] = field(default_factory=dict)
     contacts: tuple[StopContactSpec | PairSpec, ...] = ()
+    doubts: tuple[str, ...] = ()
+    remarks: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def stop_contacts(self) -> tuple[StopContactSpec, ...]:

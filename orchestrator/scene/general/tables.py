@@ -85,6 +85,7 @@ def _general(
 ) -> GeneralScene:
     record = draft.record
     assert record is not None
+    facts = [component.facts for component in draft.components.values() if component.facts]
     general = GeneralScene(
         components=tuple(_component(component, plan, axes) for component in draft.components.values()),
         connections=tuple(_connection(table) for table in draft.connections if table),
@@ -98,6 +99,8 @@ def _general(
         guard=execution.guard,
         units={key: draft.unit(key) for key in (*record.variables, *(axis.key for axis in axes))},
         contacts=tuple(_contact(draft, plan, place, axes) for place in range(len(draft.contacts))),
+        doubts=tuple(dict.fromkeys(f"{one.file}: {doubt}" for one in facts for doubt in one.doubts)),
+        remarks={one.file: one.remarks for one in facts if one.remarks},
     )
     return replace(general, start_units={key: draft.unit(key) for key, _ in general.numbers()})
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 from support.component_fmu import VERSIONS, ComponentFmu
+from support.fmpy_checks import validate
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.description import UnitDefinition
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.fmpy_door import read_description
 
 
 @pytest.mark.parametrize("version", VERSIONS)

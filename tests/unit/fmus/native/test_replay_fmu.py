@@ -15,6 +15,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from support.component_fmu import VERSIONS
+from support.fmpy_checks import validate
 from support.replay_records import (
     COUNT,
     DAY,
@@ -36,7 +37,7 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.replay_fmu import FOLDER, ReplaySignal, build_replay
 from vibroimpact.orchestrator.commands.cli import main

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from fmpy.validation import validate_fmu
+from support.fmpy_checks import validate
 
 from vibroimpact.fmus import component_name, components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
@@ -14,7 +15,8 @@ from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.build import is_current
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.model_description import Grade
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 VERSIONS = ("2.0", "3.0")
@@ -57,8 +59,9 @@ def test_a_misspelt_capability_is_found_though_the_schema_lets_it_pass(tmp_path:
     path = changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change)
     assert validate(path) == ()
     problems = check_fmu(path)
-    assert [problem.partition(":")[0] for problem in problems] == ["ModelExchange", "CoSimulation"]
-    assert all("got canGetAndSetFMUstate. Did you mean canGetAndSetFMUState?" in p for p in problems)
+    assert [problem.text.partition(":")[0] for problem in problems] == ["ModelExchange", "CoSimulation"]
+    assert all("got canGetAndSetFMUstate. Did you mean canGetAndSetFMUState?" in one.text for one in problems)
+    assert {one.grade for one in problems} == {Grade.doubt}
 
 
 @pytest.mark.parametrize(
@@ -72,15 +75,16 @@ def test_a_misspelt_capability_is_found_though_the_schema_lets_it_pass(tmp_path:
 def test_names_are_judged_as_by_fmpy(tmp_path: Path, name: str, is_legal: bool) -> None:
     path = changed(fmu_path("Gain"), tmp_path / "G.fmu", with_text('name="gain"', f'name="{name}"'))
     assert validate(path) == tuple(validate_fmu(str(path)))
-    assert (validate(path) == ()) == is_legal
+    assert (validate(path) == ()) == (check_fmu(path) == ()) == is_legal
 
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_a_token_that_is_not_the_binarys_is_found(tmp_path: Path, fmi: str) -> None:
     token = unpack(fmu_path("Oscillator", fmi)).token
     change = with_text(token, "{00000000-0000-0000-0000-000000000000}")
-    (problem,) = check_fmu(changed(fmu_path("Oscillator", fmi), tmp_path / "O.fmu", change))
-    assert "expected an instance for the token of the description" in problem
+    found = check_fmu(changed(fmu_path("Oscillator", fmi), tmp_path / "O.fmu", change))
+    assert all("expected an instance for the token of the description" in one.text for one in found)
+    assert Grade.refused in {one.grade for one in found}
 
 
 def test_a_declared_binary_that_is_absent_is_found(tmp_path: Path) -> None:
@@ -88,7 +92,10 @@ def test_a_declared_binary_that_is_absent_is_found(tmp_path: Path) -> None:
         return name.replace(f"/Oscillator{SUFFIX}", f"/Other{SUFFIX}"), content
 
     problems = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
-    assert f"binaries/{binary_folder('3.0')}/Oscillator{SUFFIX}: expected this file" in problems[0]
+    folder = f"binaries/{binary_folder('3.0')}"
+    assert f"{folder}/Oscillator{SUFFIX}: expected this file" in problems[0].text
+    (refused,) = [one.text for one in problems if one.grade is Grade.refused]
+    assert f"got '{folder}/Other{SUFFIX}'. Its file and the modelIdentifier" in refused
 
 
 def test_a_binary_that_does_not_load_is_found(tmp_path: Path) -> None:
@@ -96,7 +103,8 @@ def test_a_binary_that_does_not_load_is_found(tmp_path: Path) -> None:
         return name, b"no machine code" if name.startswith("binaries/") else content
 
     (problem,) = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
-    assert "expected a library that loads" in problem
+    assert "expected a library that loads" in problem.text
+    assert problem.grade is Grade.refused
 
 
 def test_a_function_that_does_not_resolve_is_found(tmp_path: Path) -> None:
@@ -105,14 +113,26 @@ def test_a_function_that_does_not_resolve_is_found(tmp_path: Path) -> None:
         return name, renamed if name.startswith("binaries/") else content
 
     problems = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
-    assert "got none called fmi3GetShiftDecimal" in problems[0]
+    assert "got none called fmi3GetShiftDecimal" in problems[0].text
+    assert {one.grade for one in problems} == {Grade.remark}  # no run calls it but of an FMU with clocks
+
+
+def test_a_function_that_each_run_calls_is_a_refusal(tmp_path: Path) -> None:
+    def change(name: str, content: bytes) -> tuple[str, bytes]:
+        renamed = content.replace(b"\0fmi3DoStep\0", b"\0fmi3DoStex\0")
+        return name, renamed if name.startswith("binaries/") else content
+
+    problems = check_fmu(changed(fmu_path("Gain"), tmp_path / "G.fmu", change))
+    assert [(one.grade, "got none called fmi3DoStep" in one.text) for one in problems] == [
+        (Grade.refused, True)
+    ]
 
 
 def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path) -> None:
     path = tmp_path / "O.fmu"
     path.write_bytes(b"nothing")
     (problem,) = check_fmu(path)
-    assert problem.startswith("expected an FMU (a zip archive), got")
+    assert problem.text.startswith("expected an FMU (a zip archive), got")
 
 
 @pytest.mark.parametrize("fmi", VERSIONS)

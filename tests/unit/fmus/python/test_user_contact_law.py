@@ -21,10 +21,11 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
     free,
 )
+from support.fmpy_checks import validate
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.check import check_fmu
-from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.python_fmus import USER_CONTACT_LAW, build_user_contact_law
 
 pytest.importorskip("pythonfmu")

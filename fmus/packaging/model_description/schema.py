@@ -1,0 +1,198 @@
+"""What FMI's schema says of a description, graded: attributes and elements that nothing here reads are left out."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+
+from vibroimpact.fmus.packaging.model_description.findings import Findings, Grade
+
+_XSD = "{http://www.w3.org/2001/XMLSchema}"
+_XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
+#: Elements whose content is a tool's own.
+_FREE = {"VendorAnnotations", "Annotations"}
+#: Attributes that no number depends on, here or in an FMU.
+INCONSEQUENTIAL = {
+    *("modelName", "description", "author", "version", "copyright", "license", "generationTool", "quantity"),
+    *("generationDateAndTime", "variableNamingConvention", "displayUnit", "nominal", "unbounded"),
+    *("relativeQuantity", "startTime", "stopTime", "dependenciesKind", "numberOfEventIndicators"),
+}
+#: Attributes that can be read as if they were not there; what that assumes is said.
+DISPENSABLE = {
+    *("min", "max", "start", "unit", "tolerance", "stepSize", "dependencies", "variability", "initial"),
+    *("reinit", "derivative", "fixedInternalStepSize", "maxOutputDerivativeOrder"),
+    "recommendedIntermediateInputSmoothness",
+}
+#: Children of the root that are read wherever they stand.
+_ANYWHERE = {
+    *("UnitDefinitions", "TypeDefinitions", "LogCategories", "DefaultExperiment", "VendorAnnotations"),
+    *("ModelExchange", "CoSimulation", "ScheduledExecution", "Annotations"),
+}
+#: Rounds of the schema, in each of which elements may be left out; errors that are graded one by one.
+_MOST_ROUNDS, _MOST_ERRORS = 20, 1000
+#: Refusals that are told, and characters of a name that is compared with the schema's or of a value that is repeated.
+_MOST_TOLD, _LONGEST = 10, 80
+_ATTRIBUTE = re.compile(r"attribute '([^']+)'")
+
+
+def amend_by_schema(root: Any, version: str, schemas: Path, findings: Findings) -> None:
+    """Amend a description until FMI's schema takes it, or add why it is refused.
+
+    Parameters
+    ----------
+    root : lxml element
+        The description; changed.
+    version : str
+        `2.0` or `3.0`.
+    schemas : Path
+        FMI's schemas, one folder for each version.
+    findings : Findings
+        Grows.
+    """
+    folder = schemas / f"fmi{version[0]}"
+    _drop_unknown_attributes(root, version, folder, findings)
+    _Amendments(root, folder, findings).make()
+
+
+def build_problems(content: bytes, schemas: Path) -> tuple[str, ...]:
+    """Return what FMI 3.0's schema says against a `sources/buildDescription.xml`, which no run looks at."""
+    try:
+        root = etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
+    except etree.XMLSyntaxError as error:
+        return (f"expected well-formed XML, got: {error}.",)
+    schema = _schema(schemas / "fmi3", "BuildDescription")
+    if schema.validate(root):
+        return ()
+    return tuple(f"line {e.line}: {_cut_message(e.message)}" for e in list(schema.error_log)[:_MOST_TOLD])
+
+
+@cache
+def _schema(folder: Path, kind: str = "ModelDescription") -> Any:
+    return etree.XMLSchema(etree.parse(folder / f"{folder.name}{kind}.xsd"))
+
+
+@cache
+def _names(folder: Path, kind: str) -> frozenset[str]:
+    files = [etree.parse(path) for path in folder.glob("*.xsd")]
+    return frozenset(e.get("name", "") for file in files for e in file.iter(f"{_XSD}{kind}"))
+
+
+def _drop_unknown_attributes(root: Any, version: str, folder: Path, findings: Findings) -> None:
+    """Leave out attributes of no name of the schema, which lets some pass whatever their spelling."""
+    known = _names(folder, "attribute")
+    for element in _described(root):
+        for name in [name for name in element.attrib if name not in known and not name.startswith(_XSI)]:
+            del element.attrib[name]
+            near = [] if name.startswith("{") else difflib.get_close_matches(name[:_LONGEST], known, n=1)
+            hint = f" Did you mean {near[0]}?" if near else ""
+            got = f"{element.tag}: expected an attribute of FMI {version}'s schema, got {_cut(name)}.{hint}"
+            findings.add(Grade.doubt if near else Grade.remark, got)
+
+
+def _described(root: Any) -> list[Any]:
+    """Return the elements outside what is a tool's own."""
+    found, waiting = [], [root]
+    while waiting:
+        element = waiting.pop()
+        found.append(element)
+        waiting += [child for child in reversed(element) if child.tag not in _FREE]
+    return found
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+class _Amendments:
+    """What is changed in a description until the schema takes it."""
+
+    def __init__(self, root: Any, folder: Path, findings: Findings) -> None:
+        self._root, self._folder, self._findings = root, folder, findings
+        self._moved: list[Any] = []
+        self._accepted: set[str] = set()
+
+    def make(self) -> None:
+        """Amend the description; what cannot be amended is refused."""
+        for _ in range(_MOST_ROUNDS):
+            # their elements are found before any is taken out: places change then
+            errors = [(error, self._element(error)) for error in self._errors()]
+            left = [error for error, element in errors if not self._amend(error, element)]
+            if left or not errors:
+                break
+        else:
+            left = self._errors()
+        for error in left[:_MOST_TOLD]:
+            self._findings.add(Grade.refused, f"line {error.line}: {_cut_message(error.message)}")
+        self._root.extend(self._moved)
+
+    def _errors(self) -> list[Any]:
+        schema = _schema(self._folder)
+        if schema.validate(self._root):
+            return []
+        return [error for error in schema.error_log if error.message not in self._accepted][:_MOST_ERRORS]
+
+    def _element(self, error: Any) -> Any:
+        """Return the element that an error is about; None where the schema does not say it."""
+        found = self._root.getroottree().xpath(error.path) if error.path else []
+        return found[0] if found else None
+
+    def _amend(self, error: Any, element: Any) -> bool:
+        """Amend what one error is about; return whether that can be done."""
+        attribute = _ATTRIBUTE.search(error.message)
+        if element is None:
+            return False
+        if attribute is None:
+            return self._amend_element(error, element)
+        if element.get(attribute[1]) is None:
+            return self._accept_missing(error, element, attribute[1])
+        return self._drop_attribute(error, element, attribute[1])
+
+    def _accept_missing(self, error: Any, element: Any, name: str) -> bool:
+        """Accept that an attribute is not there: nothing needs it, or an error before was about it."""
+        if "is required but missing" not in error.message:
+            return True
+        if name not in INCONSEQUENTIAL:
+            return False
+        self._accepted.add(error.message)
+        self._findings.add(Grade.remark, f"{element.tag}: expected an attribute {name}, got none.")
+        return True
+
+    def _drop_attribute(self, error: Any, element: Any, name: str) -> bool:
+        misplaced = "is not allowed" in error.message and "attribute" in error.message
+        if not misplaced and name not in INCONSEQUENTIAL | DISPENSABLE:
+            return False
+        value = element.attrib.pop(name)
+        grade = Grade.remark if name in INCONSEQUENTIAL else Grade.doubt
+        expected = f"no attribute {name}" if misplaced else "a value that FMI allows"
+        got = f"{element.tag}: {name}: expected {expected}, got {_cut(value)!r}. It is not looked at."
+        self._findings.add(grade, got)
+        return True
+
+    def _amend_element(self, error: Any, element: Any) -> bool:
+        """Leave out an element that FMI does not know; take one that stands elsewhere from there at the end."""
+        tag = str(element.tag)
+        if "This element is not expected" not in error.message or element is self._root:
+            return False
+        if element.getparent() is None:  # taken out already
+            return True
+        if element.getparent() is self._root and tag in _ANYWHERE and tag not in {e.tag for e in self._moved}:
+            self._moved.append(element)
+            got = (
+                f"{tag}: expected it in the order of FMI's schema, got it at another place. It is read there."
+            )
+        elif tag not in _names(self._folder, "element"):
+            got = f"{_cut(tag)}: expected an element of FMI's schema, got another. It is not looked at."
+        else:
+            return False
+        self._findings.add(Grade.remark, got)
+        element.getparent().remove(element)
+        return True
+
+
+def _cut_message(message: str) -> str:
+    return message if len(message) <= 5 * _LONGEST else f"{message[: 5 * _LONGEST]}..."
