@@ -62,6 +62,8 @@ class FlatSystem:
         In the order of the file; without the gains.
     ignored : list of str
         Parameters that no variable takes, and names of mappings that no parameter has: SSP wants them left out.
+    overruled : list of str
+        Parameters that a connection gives another value than a parameter set of their own: the connection's is taken.
 
     Raises
     ------
@@ -75,6 +77,7 @@ class FlatSystem:
         self._all = dict(components_of(system))
         self.components = {path: one for path, one in self._all.items() if path not in gains}
         self.ignored: list[str] = []
+        self.overruled: list[str] = []
         self._facts = facts
         self._systems = dict(_systems(system, ()))
         self._edges: dict[Node, _Edge] = {}
@@ -82,6 +85,7 @@ class FlatSystem:
         for path, inner in self._systems.items():
             for connection in inner.connections:
                 self._add(self._directed(path, connection))
+        self._connected: dict[Node, StartValue] = {}
         self._values = self._start_values()
 
     def links(self, gains: Mapping[Path, float] | None = None) -> list[Link]:
@@ -100,8 +104,12 @@ class FlatSystem:
             for binding in element.bindings:
                 self.ignored += [".".join((*path, name)) for name in binding.unmatched]
                 for parameter in binding.parameters:
-                    self.apply(parameter, path, values)
+                    self.apply(parameter, path, values, self._connected)
         return values
+
+    def connected(self) -> dict[Node, StartValue]:
+        """Return the start values that connections give, of a system's parameter to one of a component."""
+        return dict(self._connected)
 
     def named(self, parameter: Parameter) -> tuple[Parameter, ...]:
         """Return a parameter of a set from outside by the names of the system, as its own mappings have them."""
@@ -109,32 +117,57 @@ class FlatSystem:
         return tuple(mapped) or (parameter,)
 
     def apply(
-        self, parameter: Parameter, path: Path, values: dict[Path, dict[str, StartValue]]
+        self,
+        parameter: Parameter,
+        path: Path,
+        values: dict[Path, dict[str, StartValue]],
+        connected: dict[Node, StartValue],
     ) -> list[Node]:
-        """Give a parameter of an element to the variables that it names; return these."""
-        taken = [
-            node
-            for node, value in self._meant(path, parameter.name, parameter, frozenset())
-            if self._give(node, value, values)
-        ]
+        """Give a parameter of an element to the variables that it names; return these.
+
+        A variable that is connected takes the value of its connection, whatever it is given beside; `connected` has
+        those values, and grows.
+        """
+        taken = []
+        for node, value, through in self._meant(path, parameter.name, parameter):
+            given = self._given(node, value)
+            if given is None:
+                continue
+            taken.append(node)
+            other = connected.get(node) if not through else values[node.element].get(node.name)
+            if other is not None and other != given and not (through and node in connected):
+                self._overrule(node, *((given, other) if through else (other, given)))
+            if through:
+                connected[node] = given
+            values[node.element][node.name] = connected.get(node, given)
         if not taken:
             self.ignored.append(".".join((*path, parameter.name)))
         return taken
 
-    def _give(self, node: Node, parameter: Parameter, values: dict[Path, dict[str, StartValue]]) -> bool:
+    def _overrule(self, node: Node, taken: StartValue, other: StartValue) -> None:
+        where = ".".join((*node.element, node.name))[:100]
+        self.overruled.append(
+            f"{where}: {quoted(taken)} of its connection was taken, not {quoted(other)} of a parameter set"
+        )
+
+    def _given(self, node: Node, parameter: Parameter) -> StartValue | None:
+        """Return the start value that a variable is given; None where it takes none."""
         variable = self._facts[node.element].variables.get(node.name)
         if variable is None or not variable.settable or not variable.scalar:
-            return False
-        where = ".".join((*node.element, node.name))[:100]
-        values[node.element][node.name] = start_value(variable, parameter, where)
-        return True
+            return None
+        return start_value(variable, parameter, ".".join((*node.element, node.name))[:100])
 
     def _meant(
-        self, path: Path, name: str, parameter: Parameter, seen: frozenset[Node]
-    ) -> Iterator[tuple[Node, Parameter]]:
-        """Yield each variable of a component that a name means in an element, with the value that it gets."""
+        self,
+        path: Path,
+        name: str,
+        parameter: Parameter,
+        seen: frozenset[Node] = frozenset(),
+        through: bool = False,
+    ) -> Iterator[tuple[Node, Parameter, bool]]:
+        """Yield each variable that a name means in an element, its value, and whether a connection gives it."""
         if path in self._all:
-            yield Node(path, name), parameter
+            yield Node(path, name), parameter, through
             return
         system, node = self._systems[path], Node(path, name)
         if name in system.connectors and node not in seen:
@@ -142,11 +175,11 @@ class FlatSystem:
             inner = Parameter(name, _in_unit(parameter, own, name), own or parameter.unit)
             for edge in self._leaving.get(node, ()):
                 given = _along(inner, edge.connection, self._unit(edge.target))
-                yield from self._meant(edge.target.element, edge.target.name, given, seen | {node})
+                yield from self._meant(edge.target.element, edge.target.name, given, seen | {node}, True)
         # a dot may be part of an element's name
         for dot in (match.start() for match in _DOT.finditer(name)):
             if name[:dot] in system.elements:
-                yield from self._meant((*path, name[:dot]), name[dot + 1 :], parameter, seen)
+                yield from self._meant((*path, name[:dot]), name[dot + 1 :], parameter, seen, through)
 
     def _inner_first(self) -> list[tuple[Path, System]]:
         return sorted(self._systems.items(), key=lambda item: -len(item[0]))

@@ -37,7 +37,7 @@ from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
 
 MOST_COMPONENTS = 1000
-#: Parameters of no variable that one note names.
+#: Parameters of no variable that one note names, and parameters with two values that notes name.
 MOST_NAMED = 5
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
 _scratch: list[ScratchFolder] = []
@@ -216,7 +216,8 @@ def _read(
     tables, more = scene_tables(structure, flat, fmus, facts)
     if parameters:
         with_sets(tables, flat, facts, read_sets(archive, parameters))
-    return tables, [*notes, *_left_out(flat.ignored), *more]
+    overruled = dict.fromkeys(flat.overruled)
+    return tables, [*notes, *_left_out(flat.ignored), *list(overruled)[:MOST_NAMED], *more]
 
 
 def _left_out(ignored: Sequence[str]) -> Iterator[str]:

@@ -73,7 +73,8 @@ def _point(
     """Return the start values that a set gives, by key of the scene."""
     values: dict[Path, dict[str, StartValue]] = {path: {} for path in facts}
     named = [one for parameter in parameters for one in flat.named(parameter)]
-    taken = [node for parameter in named for node in flat.apply(parameter, (), values)]
+    connected = flat.connected()
+    taken = [node for parameter in named for node in flat.apply(parameter, (), values, connected)]
     if not taken:
         raise UsageError(
             f"{name}: expected a parameter of this system such as {_example(facts, names)}, got none."

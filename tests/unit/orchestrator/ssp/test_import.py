@@ -138,6 +138,35 @@ def test_a_parameter_is_renamed_converted_and_handed_on_by_a_connector(
     assert dict(general.components[0].parameters) == {"mass": 5.0}
 
 
+@pytest.mark.parametrize("first", ["heaviness", "body.mass"])
+def test_a_connected_parameter_takes_the_value_of_its_connection_and_the_other_is_said(
+    tmp_path: Path, fmus: dict[str, Path], first: str
+) -> None:
+    both = {"heaviness": real(30.0), "body.mass": real(10.0)}
+    given = {name: both[name] for name in (first, *both.keys() - {first})}
+    description = ssd(
+        body(values({"mass": real(20.0)})),
+        connection("heaviness", "body.mass"),
+        connectors=connector("heaviness", "parameter"),
+        bindings=values(given),
+    )
+    path = archive(tmp_path / "s.ssp", description, fmus)
+    imported = load_system(path)
+    assert imported.scene.general is not None
+    assert imported.scene.general.components[0].parameters["mass"] == 30.0
+    said = [note for note in imported.notes if "of its connection" in note]
+    assert "body.mass: 30.0 of its connection was taken, not 10.0 of a parameter set" in said
+    other = tmp_path / "set.ssv"
+    other.write_text(ssv({"body.mass": real(40.0)}))
+    again = load_system(path, parameters=[other])
+    assert again.scene.general is not None
+    assert again.scene.general.components[0].parameters["mass"] == 30.0
+    other.write_text(ssv({"heaviness": real(50.0)}))
+    again = load_system(path, parameters=[other])
+    assert again.scene.general is not None
+    assert again.scene.general.components[0].parameters["mass"] == 50.0
+
+
 def test_types_fit_their_variables_and_what_no_variable_takes_is_noted(
     tmp_path: Path, fmus: dict[str, Path]
 ) -> None:
