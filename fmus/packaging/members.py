@@ -6,7 +6,7 @@ import hashlib
 import os
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 
@@ -115,7 +115,7 @@ def members_of(contents: Contents) -> dict[str, bytes]:
     resources = dict(contents.resources)
     if contents.counts:
         lines = (f"{plural(block)} {count}\n" for block, count in contents.counts.items())
-        resources[SIZES_MEMBER] = "".join(lines).encode("ascii")
+        resources[SIZES_MEMBER] = "".join((*lines, *_hidden_laws(contents))).encode("ascii")
     component = contents.component
     if fmi == "3.0" and (contents.edition is not None or resources):
         resources[REFERENCES_MEMBER], component = _numbered(component)
@@ -134,6 +134,13 @@ def members_of(contents: Contents) -> dict[str, bytes]:
     if contents.edition is not None:
         members |= _for_people(component, fmi, contents.edition, trial)
     return members | resources
+
+
+def _hidden_laws(contents: Contents) -> Iterator[str]:
+    """Yield the line that lets messages name only the laws that the description has."""
+    ports = {v.ports for v in contents.component.variables if v.repeat == "contact"}
+    if "external" in {v.ports for v in contents.original.variables} - ports:
+        yield "external_laws 0\n"
 
 
 def _for_people(

@@ -1,6 +1,6 @@
 """`make exchange`: every export in every tool that is here, into docs/exchange.md; exit code 1 where one differs.
 
-`python -m exchange machines` makes one of its tables: tools, pairs, integrated, systems, reference, machines.
+`python -m exchange machines` makes one of its tables: tools, pairs, integrated, stiff, systems, reference, machines.
 A tool that is not here has no row; the program says so.
 """
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from support.places import ROOT
 
-from exchange import _model_exchange, _systems
+from exchange import _model_exchange, _stiff, _systems
 from exchange._cases import (
     COUNT,
     NAMES,
@@ -30,7 +30,19 @@ from exchange._cases import (
 )
 from exchange._machines import MACHINES, HostFailedError, Machine
 from exchange._reference import BALL, EXAMPLE, VERSIONS, bounces, found, imported, missing
-from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupled, run_integrated, run_system
+from exchange._tools import (
+    CASADI,
+    TOOLS,
+    Answer,
+    Tool,
+    ToolFailedError,
+    run,
+    run_coupled,
+    run_integrated,
+    run_system,
+    steps_of,
+)
+from vibroimpact.fmus.packaging.export import export_fmu
 
 PAGE = ROOT / "docs" / "exchange.md"
 GOAL = 1e-9
@@ -46,6 +58,7 @@ def main() -> int:
         "tools": lambda: _of_tools("tools", list(NAMES), _row_of_tool),
         "pairs": lambda: _of_tools("pairs", list(PAIRS), _row_of_pair),
         "integrated": _of_integrated,
+        "stiff": _of_stiff,
         "systems": _of_systems,
         "reference": _of_reference_fmus,
         "machines": _of_machines,
@@ -93,6 +106,26 @@ def _cell_of_integrated(tool: Tool, fmi: str, name: str, tolerance: float) -> Ce
         it = made(name, fmi, Path(folder)).integrated(_model_exchange.STEPS[name])
         asked = (tool, it.path, it.outputs, it.step, len(it.rows), Path(folder), tolerance)
         return _cell(run_integrated, it.rows, *asked, rows=it.quiet)
+
+
+def _of_stiff() -> Iterator[str]:
+    """Write the table of steps that a stiff chain takes; yield where they are too many."""
+    lines = ["| tool | FMI | steps |", "|---|---|---|"]
+    for tool in _here(tool for tool in (*TOOLS, CASADI) if tool.name in _stiff.VERSIONS):
+        for fmi in _stiff.VERSIONS[tool.name]:
+            with tempfile.TemporaryDirectory() as folder:
+                path = export_fmu(
+                    "chain", Path(folder) / "c.fmu", masses=_stiff.MASSES, fmi=fmi, starts=_stiff.STARTS
+                )
+                try:
+                    steps = steps_of(tool, path, Path(folder), _stiff.STOP_TIME, _stiff.TOLERANCE)
+                except ToolFailedError as error:
+                    print(error, file=sys.stderr)
+                    steps = 0
+            lines.append(_line(tool.shown(), [fmi, f"{steps:,}" if steps else "failed"]))
+            if not 0 < steps <= _stiff.MOST_STEPS:
+                yield f"{tool.name}, FMI {fmi}, stiff: expected {_stiff.MOST_STEPS} steps at most, got {steps}."
+    _write("stiff", lines)
 
 
 def _of_systems() -> Iterator[str]:

@@ -132,6 +132,10 @@ TOOLS = (
 )
 
 
+CASADI = Tool("CasADi", (), package="casadi")
+"""It integrates and differentiates FMUs for model exchange, and steps none."""
+
+
 class ToolFailedError(Exception):
     """A tool gave no values; the text has its last words."""
 
@@ -182,6 +186,20 @@ def run_integrated(
     """Return what a tool makes of an FMU for model exchange that it integrates, at a relative tolerance."""
     asked = {"fmu": str(fmu), "names": list(names), "step": step, "count": count, "tolerance": tolerance}
     return _asked(tool, asked, folder)
+
+
+def steps_of(tool: Tool, fmu: Path, folder: Path, stop_time: float, tolerance: float) -> int:
+    """Return how many steps the integrator of a tool takes to an instant, s, at a relative tolerance.
+
+    Raises
+    ------
+    ToolFailedError
+        It gave no number, or warned.
+    """
+    answer = _asked(tool, {"fmu": str(fmu), "stop_time": stop_time, "tolerance": tolerance}, folder)
+    if answer.complaints:
+        raise ToolFailedError("\n".join(answer.complaints))
+    return round(answer.rows[0][0])
 
 
 def run_coupled(

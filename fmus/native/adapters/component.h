@@ -16,7 +16,7 @@
 
 enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
 
-enum { VI_READ_ONLY = 0, VI_SET_INITIAL = 1, VI_SET_TUNABLE = 2, VI_SET_INPUT = 3 };
+enum { VI_READ_ONLY = 0, VI_SET_INITIAL = 1, VI_SET_TUNABLE = 2, VI_SET_INPUT = 3, VI_SET_STATE = 4 };
 
 /* One variable; its value reference is its index in the table. */
 typedef struct {
@@ -57,6 +57,9 @@ typedef struct {
     const char *token;
     const vi_variable *variables;
     size_t variable_count;
+    /* References of the continuous states: all displacements, then all velocities; NULL where there are none. */
+    const uint32_t *states;
+    size_t state_count;
     size_t struct_size;
 
     /* Fill `self` (zeroed) with the default values. */

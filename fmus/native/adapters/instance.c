@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sizes.h"
+
 static const vi_component *const component = &vi_this_component;
 
 /* Largest amount by which a step may pass the stop time: the rounding of an importer's sums, relative to 1 + |time|. */
@@ -64,7 +66,8 @@ static void put_start(vi_instance *instance, const vi_start *start)
 {
     const vi_variable *variable =
         start->reference < component->variable_count ? &component->variables[start->reference] : NULL;
-    if (variable == NULL || variable->access == VI_READ_ONLY || variable->count != 1) {
+    if (variable == NULL || variable->access == VI_READ_ONLY || variable->access == VI_SET_STATE
+        || variable->count != 1) {
         return;
     }
     char *field = (char *)instance->self + variable->offset;
@@ -328,9 +331,18 @@ bool vi_instance_get(vi_instance *instance, const char *function, int type, cons
     return all_values_used(instance, function, first, value_count);
 }
 
+/* A state may be set one by one where all may be set at once: there are tools that make a Jacobian so. */
+static bool may_set_states(const vi_instance *instance)
+{
+    return instance->exchange && instance->mode == VI_MODE_CONTINUOUS;
+}
+
 static bool may_set(vi_instance *instance, const char *function, const vi_variable *variable, uint32_t reference)
 {
-    if (variable->access == VI_READ_ONLY) {
+    if (variable->access == VI_SET_STATE && may_set_states(instance)) {
+        return true;
+    }
+    if (variable->access == VI_READ_ONLY || variable->access == VI_SET_STATE) {
         return vi_instance_fail(instance, function, "value reference %lu cannot be set", (unsigned long)reference);
     }
     const int modes = variable->access == VI_SET_INITIAL ? VI_BEFORE_START : VI_BEFORE_START | VI_RUNNING;
@@ -341,9 +353,22 @@ static bool may_set(vi_instance *instance, const char *function, const vi_variab
     return true;
 }
 
+/* Place of a state among those that the description has: of both halves perhaps fewer than were compiled in. */
+static size_t place_of_state(const vi_instance *instance, uint32_t own)
+{
+    const size_t most = component->state_count / 2, described = component->exchange->states(instance->self) / 2;
+    size_t i = 0;
+    while (i < component->state_count && component->states[i] != own) {
+        ++i;
+    }
+    return i / most * described + i % most;
+}
+
 bool vi_instance_set(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      const void *values, size_t value_count, vi_convert convert)
 {
+    double states[VI_MOST_STATES];
+    bool changes_states = false;
     size_t first = 0;
     for (size_t i = 0; i < n; ++i) {
         const vi_variable *variable = find(instance, function, type, references[i]);
@@ -353,9 +378,23 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
         if (variable->count > value_count - first) {
             return vi_instance_fail(instance, function, "expected more than %lu values", (unsigned long)value_count);
         }
-        convert((char *)instance->self + variable->offset, (void *)(uintptr_t)values, first, variable->count);
-        component->was_set(instance->self, (uint32_t)(variable - component->variables));
+        void *field = (char *)instance->self + variable->offset;
+        const uint32_t own = (uint32_t)(variable - component->variables);
+        if (variable->access == VI_SET_STATE) {
+            if (!changes_states) {
+                component->exchange->get_states(instance->self, states);
+            }
+            changes_states = true;
+            field = &states[place_of_state(instance, own)];
+        }
+        convert(field, (void *)(uintptr_t)values, first, variable->count);
+        if (variable->access != VI_SET_STATE) {
+            component->was_set(instance->self, own);
+        }
         first += variable->count;
+    }
+    if (changes_states) {
+        component->exchange->set_states(instance->self, states);
     }
     instance->outputs_stale = true;
     return all_values_used(instance, function, first, value_count);

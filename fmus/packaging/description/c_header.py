@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 
 from vibroimpact.fmus.packaging.description.model import ComponentDescription, Variable
 
@@ -31,17 +32,33 @@ def _lines(component: ComponentDescription) -> Iterator[str]:
     yield from (f"    {prefix}_{v.code} = {v.value_reference}," for v in component.variables)
     yield from (f"    {prefix}_VARIABLE_COUNT = {len(component.variables)}", "};", "")
     yield f"static const vi_variable {component.folder}_variables[] = {{"
-    yield from (_row(component, v) for v in component.variables)
-    yield from ("};", "", "#endif")
+    states = frozenset(component.states())
+    yield from (_row(component, v, states) for v in component.variables)
+    yield "};"
+    yield from _states(component, prefix)
+    yield from ("", "#endif")
 
 
-def _row(component: ComponentDescription, variable: Variable) -> str:
+def _states(component: ComponentDescription, prefix: str) -> Iterator[str]:
+    """Yield the table of the continuous states, in their order; none where there are none."""
+    codes = {v.name: v.code for v in component.variables}
+    states = component.states()
+    if states:
+        yield from ("", f"enum {{ {prefix}_STATE_COUNT = {len(states)} }};")
+        yield f"static const uint32_t {component.folder}_states[] = {{"
+        yield from (f"    {prefix}_{codes[name]}," for name in states)
+        yield "};"
+
+
+def _row(component: ComponentDescription, variable: Variable, states: AbstractSet[str]) -> str:
     offset = f"offsetof({component.struct}, {variable.field})"
-    kind = f"{C_TYPES[variable.type]}, {_access(variable)}, {variable.count}u"
+    kind = f"{C_TYPES[variable.type]}, {_access(variable, states)}, {variable.count}u"
     return f"    {{{kind}, {offset}}}, /* {variable.name} */"
 
 
-def _access(variable: Variable) -> str:
+def _access(variable: Variable, states: AbstractSet[str]) -> str:
+    if variable.name in states:
+        return "VI_SET_STATE"
     if variable.causality == "input":
         return "VI_SET_INPUT"
     if variable.causality == "parameter" and variable.variability == "tunable":

@@ -180,8 +180,13 @@ class ComponentDescription:
         """Return the derivatives of the continuous states: those of displacements, then those of velocities."""
         names = {v.name for v in self.variables}
         found = [v for v in self.variables if v.derivative in names]
-        second = {v.derivative for v in found} & {v.name for v in found}
-        return tuple(sorted(found, key=lambda v: v.derivative in second))
+        shown = self._states_by_field()
+        return tuple(sorted(found, key=lambda v: v.field not in shown))
+
+    def _states_by_field(self) -> dict[str, str]:
+        """Return the states by where they are stored; the derivative of a displacement is where a velocity is."""
+        states = {v.derivative for v in self.variables if v.derivative}
+        return {v.field: v.name for v in self.variables if v.name in states}
 
     def states(self) -> tuple[str, ...]:
         """Return the names of the continuous states, in the order of `derivatives`."""
@@ -195,10 +200,10 @@ class ComponentDescription:
         """Return the names of the inputs and states that an output depends on directly."""
         if variable.variability != "continuous":
             return self.direct_inputs(variable, version)
-        states = self.states()
-        return (
-            (variable.name,) if variable.name in states else (*self.direct_inputs(variable, version), *states)
-        )
+        shown = self._states_by_field()
+        if variable.field in shown:
+            return (shown[variable.field],)
+        return (*self.direct_inputs(variable, version), *self.states())
 
     def direct_inputs(self, variable: Variable, version: int) -> tuple[str, ...]:
         """Return the names of the inputs of that FMI version that an output depends on directly."""

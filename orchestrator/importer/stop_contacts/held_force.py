@@ -347,10 +347,12 @@ class HeldForceBond:
         mass = self._trials.measured_mass(self._time, size)
         if not (mass > 0.0 and math.isfinite(mass)):
             got = "one that does not change" if math.isnan(mass) else f"an effective mass of {mass:.3g} kg"
+            signs = "Look at the variables and signs of [[contact]], or give its mass."
+            # a velocity that stays is most often that of a body that has not made its own step yet
+            hint = f"{signs} {OWN_STEPS}" if mass < 0.0 else f"{OWN_STEPS} {signs}"
             raise ComponentError(
                 f"{self.contact.body}.{self.contact.velocity}: expected a velocity that grows with the force "
-                f"{self.contact.force}, got {got} in a trial step at time {self._time:.12g}. "
-                f"Look at the variables and signs of [[contact]], or give its mass. {OWN_STEPS}",
+                f"{self.contact.force}, got {got} in a trial step at time {self._time:.12g}. " + hint,
                 instance=self.contact.body,
                 time=self._time,
             )

@@ -146,7 +146,7 @@ def test_an_exported_fmu_has_just_the_contacts_asked_for_and_passes(
     assert {name.split(".")[0] for name in names if name.startswith("contact[")} == {
         f"contact[{k + 1}]" for k in range(contacts)
     }
-    assert (unpack(path).resources / "sizes.txt").read_text() == f"contacts {contacts}\n"
+    assert (unpack(path).resources / "sizes.txt").read_text() == f"contacts {contacts}\nexternal_laws 0\n"
 
 
 def test_an_export_needs_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,6 +36,9 @@ void vi_structure_component_sized(vi_structure_component *c, const char *block, 
     if (strcmp(block, "contacts") == 0 && count >= 0 && count <= VI_PORTS) {
         c->contacts_described = count;
     }
+    if (strcmp(block, "external_laws") == 0) {
+        c->external_hidden = count == 0;
+    }
 }
 
 vi_exchange_body vi_structure_component_exchange(vi_structure_component *c)
@@ -59,12 +62,18 @@ static port_name name_of(int k, const char *variable)
     return name;
 }
 
-static void check_contact(char *message, int k, const vi_contact *contact)
+static bool is_inside(int64_t law)
+{
+    return vi_contact_law_exists(law) && !vi_contact_law_is_external(law);
+}
+
+static void check_contact(char *message, int k, const vi_contact *contact, bool external_hidden)
 {
     const vi_contact_law *law = &contact->law;
     const port_name port = name_of(k, "");
     if (!vi_contact_law_exists(law->law)) {
-        vi_complain_of_law(message, name_of(k, "law").text, "", vi_contact_law_exists, law->law);
+        vi_complain_of_law(message, name_of(k, "law").text, "", external_hidden ? is_inside : vi_contact_law_exists,
+                           law->law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
         vi_complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", k + 1,
@@ -104,7 +113,7 @@ void vi_structure_component_check(const vi_structure_component *c, char message[
     vi_check_finite(message, "forcing.phase", c->forcing_phase);
     for (int k = 0; k < VI_PORTS; ++k) {
         if (!vi_contact_law_is_none(c->contacts[k].law.law)) {
-            check_contact(message, k, &c->contacts[k]);
+            check_contact(message, k, &c->contacts[k], c->external_hidden);
         }
     }
     if (!(c->contact_tolerance > 0.0 && c->contact_tolerance <= LOOSEST_TOLERANCE)) {

@@ -32,6 +32,7 @@ typedef struct {
     double natural[VI_MODES], modal_energy[VI_MODES];
     double modal_acceleration[VI_MODES]; /* kg^(1/2) m/s^2 */
     int32_t contacts_described; /* ports of the model description */
+    int32_t external_hidden; /* the model description does not name the laws that another component answers */
     vi_structure_model model;
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
@@ -45,7 +46,7 @@ void vi_structure_component_defaults(vi_structure_component *c);
 /* Parameters that all have: forcing's frequency and phase, the contacts' laws, tolerance, limit, shared inputs. */
 void vi_structure_component_check(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
 
-/* The model description has so many ports. */
+/* The model description has so many ports, or (`external_laws`, 0) no law that another component answers. */
 void vi_structure_component_sized(vi_structure_component *c, const char *block, int count);
 
 /* Number of ports that have to be followed: up to the last one with a law. */
