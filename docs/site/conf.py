@@ -25,6 +25,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx_design",
+    "command_blocks",
     "command_reference",
     "gallery_page",
 ]
@@ -54,6 +55,8 @@ html_css_files = ["site.css"]
 # The front page is docs/index.html; this one, at the top, leads there.
 html_additional_pages = {"index": "to_front_page.html"}
 templates_path = ["templates"]
+# A section of one page has no pages to go to: its sidebar would be empty.
+html_sidebars = {"docs/index": [], "docs/tutorial": []}
 html_copy_source = False
 html_show_copyright = False
 html_theme_options = {

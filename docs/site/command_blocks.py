@@ -1,0 +1,42 @@
+"""Blocks of commands wrap on the site; tables that a command prints keep their lines, and scroll sideways."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+CLASS = "commands"
+"""Of blocks that hold commands alone; `static/site.css` wraps them."""
+# A command begins a line; the lines that continue it are indented, or the line before them ends with a backslash.
+_COMMAND = re.compile(r"(vibroimpact|pip|pip3|python|make|git|pytest|docker|curl|cd|export) \S")
+
+
+def setup(sphinx: Any) -> dict[str, bool]:
+    """Mark blocks of commands once a page is read."""
+    sphinx.connect("doctree-read", _mark)
+    return {"parallel_read_safe": True}
+
+
+def is_commands(text: str) -> bool:
+    """Return whether a block holds commands alone.
+
+    Examples
+    --------
+    >>> is_commands("vibroimpact run a.toml -o a.nc  # writes a.nc"), is_commands("run  impacts\\n  0       20")
+    (True, False)
+    """
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    continued = False
+    for place, line in enumerate(lines):
+        if not (continued or _COMMAND.match(line) or (place and line.startswith(" ") and lines[0][0] != " ")):
+            return False
+        continued = line.endswith("\\")
+    return bool(lines)
+
+
+def _mark(sphinx: Any, doctree: Any) -> None:
+    from docutils import nodes
+
+    for block in doctree.findall(nodes.literal_block):
+        if is_commands(block.astext()):
+            block["classes"].append(CLASS)
