@@ -14,6 +14,7 @@ from vibroimpact.analysis.commands.estimate_scene import (
     cut,
     force_amplitude,
     forcing_and_known,
+    side_of_stop,
 )
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.dataset.reading import read_flat
@@ -73,6 +74,20 @@ def impacts_of(asked: Estimation, options: ImpactOptions) -> None:
         )
         print_impacts(console, found)
     dataset = found.dataset().assign_attrs(estimates="impacts")
+    _write(console, _sourced(dataset, asked.data, recording), asked)
+
+
+def bounces_of(asked: Estimation, side: str | None) -> None:
+    """Estimate the restitution of a body that bounces under a constant force."""
+    if side not in (None, "upper", "lower"):
+        raise UsageError(f'--side: expected upper or lower, got "{side}".')
+    with _estimating(asked) as console:
+        recording = open_signals(asked.data, asked.run)
+        channel = _channel(recording, asked.channel)
+        seen = side or side_of_stop(asked.data, asked.run, recording, channel)
+        found = estimate_bounces(cut(channel, asked.start, asked.stop), side=seen)
+        print_impacts(console, found)
+    dataset = found.dataset().assign_attrs(estimates="bounces")
     _write(console, _sourced(dataset, asked.data, recording), asked)
 
 

@@ -1,4 +1,4 @@
-"""The options of `vibroimpact estimate decay`, `estimate impacts` and `estimate response`."""
+"""The options of `vibroimpact estimate decay`, `impacts`, `bounces` and `response`."""
 
 from __future__ import annotations
 
@@ -25,6 +25,10 @@ RunIndex = Annotated[
 ]
 
 
+# Kinds of estimation that version 0.1 did not have: its form never meant them.
+_NEW_KINDS = ("bounces",)
+
+
 class EstimateGroup(TyperGroup):
     """The command `estimate`, which says what its form of version 0.1, `estimate FILE --kind KIND`, is now."""
 
@@ -48,7 +52,9 @@ class EstimateGroup(TyperGroup):
 
     def _kinds(self, words: Sequence[str]) -> list[str]:
         """Return the kinds of estimation that have all these options; of several that which fits the data."""
-        options = {name: _options(command) for name, command in self.commands.items()}
+        options = {
+            name: _options(command) for name, command in self.commands.items() if name not in _NEW_KINDS
+        }
         given = {word.partition("=")[0] for word in words if word.startswith("-")}
         fitting = [name for name, known in options.items() if given <= known.keys()] or list(options)
         lengths = {option: count for known in options.values() for option, count in known.items()}
@@ -183,6 +189,31 @@ def impacts(
         *(natural_frequency, damping_ratio, mass, offset, clock_drifts),
     )
     impacts_of(Estimation(data, channel, start, stop_time, run, output, figure, force), options)
+
+
+@estimate.command()
+def bounces(
+    data: Data,
+    channel: ChannelName = None,
+    start: WindowStart = None,
+    stop_time: WindowEnd = None,
+    run: RunIndex = None,
+    side: Annotated[
+        str | None, typer.Option(help="Side of the stop, upper or lower; else as the signal shows.")
+    ] = None,
+    output: DatasetFile = None,
+    figure: FigureFile = None,
+    force: Force = False,
+) -> None:
+    """Estimate the restitution of a body that bounces under its weight, or under another constant force.
+
+    Where it changes with the speed of impact, r(v) is given in its place.
+
+    Example: vibroimpact estimate bounces ball.nc --channel height -o estimates.nc --figure estimates.png
+    """
+    from vibroimpact.analysis.commands.estimate import Estimation, bounces_of
+
+    bounces_of(Estimation(data, channel, start, stop_time, run, output, figure, force), side)
 
 
 @estimate.command()

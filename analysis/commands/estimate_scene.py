@@ -174,8 +174,7 @@ def forcing_and_known(
         options.phase if options.phase is not None else _scene_phase(scene, reading),
         options.clock_drifts,
     )
-    stops = scene.get("stop", [])
-    stop = stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
+    stop = _only_stop(scene)
     position = options.stop
     if position is None and "position" in stop:
         position = reading.gain * stop["position"] + reading.zero
@@ -189,6 +188,19 @@ def forcing_and_known(
         side=reading.side(str(stop.get("side", "upper"))) if stop and options.stop is None else None,
     )
     return forcing if frequency > 0.0 else None, known
+
+
+def side_of_stop(data: Path, run: int | None, recording: Recording, channel: Channel) -> str | None:
+    """Return the side of the only stop of a simulated run, as its channel sees it; None where it is not known."""
+    scene = run_scene(data, run, recording)
+    stop = _only_stop(scene)
+    return _reading_of(channel, scene).side(str(stop.get("side", "upper"))) if stop else None
+
+
+def _only_stop(scene: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the stop of a scene; empty where there are none or several."""
+    stops = scene.get("stop", [])
+    return stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
 
 
 def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> float:

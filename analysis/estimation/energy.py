@@ -21,7 +21,8 @@ import numpy as np
 
 from vibroimpact.analysis.estimation.flight_fit import pairs_of
 from vibroimpact.analysis.estimation.physics import Floats, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.analysis.estimation.segments import Flight
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.analysis.estimation.smoothing import Smoother, smoother
 from vibroimpact.fmus.errors import EstimationError
 

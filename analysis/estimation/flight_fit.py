@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters, central_differences
-from vibroimpact.analysis.estimation.segments import DOUBTFUL, FEWEST_IN_FLIGHT, Flight, Signal
+from vibroimpact.analysis.estimation.segments import DOUBTFUL, FEWEST_IN_FLIGHT, Flight
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.fmus.core import motion
 from vibroimpact.fmus.errors import EstimationError
 

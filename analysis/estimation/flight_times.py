@@ -11,6 +11,7 @@ import math
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.estimation.bounce_flights import FEWEST_FLIGHTS, BounceFlights, flights_of
 from vibroimpact.analysis.estimation.estimates import (
     Doubt,
     FittedMotion,
@@ -18,25 +19,18 @@ from vibroimpact.analysis.estimation.estimates import (
     MethodEstimate,
     RestitutionOfSpeed,
 )
-from vibroimpact.analysis.estimation.physics import Floats, Known
-from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment_channel
+from vibroimpact.analysis.estimation.physics import Floats
+from vibroimpact.analysis.estimation.segments import Segmentation
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import EstimationError
 
 FLIGHT_TIMES = "flight_times"
-# Periods in a record of the fastest smooth motion; windows are shortened until impacts appear.
-_TURNS = 4.0
-_FEWEST_FLIGHTS = 3
-# Smallest error of an instant, in sampling intervals.
-_INSTANT = 1e-4
 # Probability of a larger scatter of the ratios by chance alone, below which they are not one ratio.
 _SELDOM = 1e-4
 # The same for r(v), below which it needs one power of the speed's logarithm more.
 _RATHER = 0.1
 # Change of r(v) below which it is one ratio, and the largest part of the scatter about one ratio that r(v) leaves.
 _SAME_RATIO, _CLEARER = 2e-3, 0.1
-# Ratio of a flight's length to that of the one before above which impacts in it were not seen.
-_LONGER = 1.02
 # Relative deviation of a flight's length from the median above which it is none of P(1,1); the largest part of such.
 _SAME_LENGTH, _OTHER_LENGTHS = 0.05, 0.2
 
@@ -50,6 +44,8 @@ def estimate_bounces(
 ) -> ImpactEstimates:
     """Estimate the restitution of a body that bounces under a constant force, such as its weight.
 
+    Flights are parabolas of one acceleration, fitted together; kinks cut the record where they are none.
+
     Parameters
     ----------
     channel : Channel or xarray.DataArray
@@ -57,7 +53,7 @@ def estimate_bounces(
     side : str or None
         `upper` or `lower` stop; None: as the signal shows.
     window : float or None
-        Of the one-sided fits at the impacts, s; None: from the noise.
+        Of one-sided fits at kinks, s, which then are taken; None: parabolas, else kinks with a window from the noise.
     confidence : float
         Of the interval.
 
@@ -70,7 +66,8 @@ def estimate_bounces(
     Raises
     ------
     EstimationError
-        No impacts were found, or fewer than three flights, each shorter than the one before.
+        No impacts were found, or fewer than three flights, each shorter than the one before; side or confidence is
+        none.
 
     Examples
     --------
@@ -83,40 +80,37 @@ def estimate_bounces(
     >>> round(estimate_bounces(ball).values["flight_times"]["restitution"].value, 4)
     0.8
     """
-    from scipy.stats import t as student
-
     channel = channel_of(channel)
-    fastest = 2.0 * math.pi * _TURNS / float(channel.time[-1] - channel.time[0])
-    cut = segment_channel(channel, fastest, Known(side=side), window)
-    impacts = _falling(cut.impacts)
-    if len(impacts) <= _FEWEST_FLIGHTS:
+    if side not in (None, "upper", "lower"):
+        raise EstimationError(f"side: expected upper or lower, got {side!r}.")
+    if not 0.0 < confidence < 1.0:
+        raise EstimationError(f"confidence: expected 0 < confidence < 1, got {confidence!r}.")
+    seen = flights_of(channel, side, window)
+    count = len(seen.lengths)
+    if count < FEWEST_FLIGHTS:
         raise EstimationError(
-            f"bounces: expected at least {_FEWEST_FLIGHTS} flights, each shorter than the one before it, got "
-            f"{len(impacts) - 1}. Give the part of the recording in which the body bounces freely, or, if a force "
+            f"bounces: expected at least {FEWEST_FLIGHTS} flights, each shorter than the one before it, got "
+            f"{count}. Give the part of the recording in which the body bounces freely, or, if a force "
             "drives it, its frequency."
         )
-    restitution, excess = _ratio(impacts, cut.signal.interval, confidence)
-    levels = cut.signal.sign * np.array([impact.level for impact in impacts])
-    error = float(np.std(levels, ddof=1)) / math.sqrt(len(levels))
-    reach = float(student.ppf(0.5 + confidence / 2.0, len(levels) - 1)) * error
-    stop = MethodEstimate.within(float(np.mean(levels)), error, reach)
-    values, of_speed = {"restitution": restitution, "stop_position": stop}, None
-    doubts: tuple[Doubt, ...] = ()
+    restitution, excess = _ratio(seen, confidence)
+    values, of_speed = {"restitution": restitution, "stop_position": seen.stop(confidence)}, None
+    doubts = seen.doubts
     remarks: tuple[str, ...] = ()
     scatter = excess
     if excess > 1.0:
-        of_speed, scatter = _of_speed(impacts, cut, confidence)
+        of_speed, scatter = _of_speed(seen, confidence)
     if of_speed is not None and float(np.ptp(of_speed.fitted)) > _SAME_RATIO and scatter < _CLEARER * excess:
         excess = scatter
         del values["restitution"]
-        remarks = (
+        remarks += (
             f"{of_speed.words(channel.unit)}. Drag, a spring or a force changes flight times alike: r(v) counts what "
             "they do as loss at the impact.",
         )
     else:
         of_speed = None
     if excess > 1.0:
-        doubts = (
+        doubts += (
             Doubt(
                 f"flight times do not shrink by one ratio, nor by one that depends on the speed alone (scatter "
                 f"{excess:.2g} times that of their errors): drag, a spring, or a force"
@@ -126,36 +120,24 @@ def estimate_bounces(
         channel.name,
         channel.unit,
         {FLIGHT_TIMES: values},
-        facts={
-            "impacts": float(len(impacts)),
-            "noise": cut.signal.noise,
-            "window": cut.window,
-            "side": cut.signal.side,
-        },
+        facts=seen.facts,
         doubts=doubts,
         remarks=remarks,
         confidence=confidence,
-        impact_times=np.array([impact.time for impact in impacts]),
+        impact_times=seen.impact_times,
         of_speed=of_speed,
-        motion=FittedMotion(channel.time, channel.values, _parabolas(cut, len(impacts)), FLIGHT_TIMES),
+        motion=FittedMotion(channel.time, channel.values, seen.fitted, FLIGHT_TIMES),
     )
 
 
-def _falling(impacts: tuple[Impact, ...]) -> list[Impact]:
-    """Return the impacts up to where a flight is longer than the one before it."""
-    lengths = np.diff([impact.time for impact in impacts])
-    longer = np.flatnonzero(lengths[1:] > _LONGER * lengths[:-1])
-    return list(impacts[: int(longer[0]) + 2] if longer.size else impacts)
-
-
-def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[MethodEstimate, float]:
+def _ratio(seen: BounceFlights, confidence: float) -> tuple[MethodEstimate, float]:
     """Return the ratio of successive flight times, and its scatter over what errors of the instants explain.
 
     Generalized least squares of log T[n] = log T[0] + n log r: neighbouring flights share the error of an instant.
     """
     from scipy.stats import t as student
 
-    lengths, covariance = _lengths(impacts, interval)
+    lengths, covariance = seen.lengths, seen.covariance
     columns = np.column_stack([np.ones(len(lengths)), np.arange(float(len(lengths)))])
     solution, found, square = _generalized(columns, np.log(lengths), covariance)
     freedom = len(lengths) - 2
@@ -166,15 +148,6 @@ def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[M
     ratio = math.exp(slope)
     estimate = MethodEstimate(ratio, ratio * error, math.exp(slope - reach), math.exp(slope + reach))
     return estimate, 0.0 if _by_chance(square, freedom) else widened
-
-
-def _lengths(impacts: list[Impact], interval: float) -> tuple[Floats, Floats]:
-    """Return the flight times, s, and the covariance of their logarithms: neighbours share the error of an instant."""
-    times = np.array([impact.time for impact in impacts])
-    errors = np.hypot([impact.time_error for impact in impacts], _INSTANT * interval)
-    lengths = np.diff(times)
-    difference = (np.eye(len(times))[1:] - np.eye(len(times))[:-1]) / lengths[:, None]
-    return lengths, difference @ np.diag(errors**2) @ difference.T
 
 
 def _generalized(columns: Floats, target: Floats, covariance: Floats) -> tuple[Floats, Floats, float]:
@@ -192,9 +165,7 @@ def _by_chance(square: float, freedom: int, probability: float = _SELDOM) -> boo
     return square <= float(chi2.isf(probability, freedom))
 
 
-def _of_speed(
-    impacts: list[Impact], cut: Segmentation, confidence: float
-) -> tuple[RestitutionOfSpeed | None, float]:
+def _of_speed(seen: BounceFlights, confidence: float) -> tuple[RestitutionOfSpeed | None, float]:
     """Return r(v), and its scatter over what errors of the instants explain, 0 where these explain it.
 
     The logarithm of the ratio of the flights before and after an impact is a line in that of the speed, or a parabola
@@ -203,8 +174,7 @@ def _of_speed(
     """
     from scipy.stats import t as student
 
-    lengths, covariance = _lengths(impacts, cut.signal.interval)
-    gravity = _acceleration(cut, len(impacts))
+    lengths, covariance, gravity = seen.lengths, seen.covariance, seen.acceleration
     step = np.eye(len(lengths))[1:] - np.eye(len(lengths))[:-1]
     ratios, covariance = step @ np.log(lengths), step @ covariance @ step.T
     speeds = 0.5 * gravity * lengths[:-1]
@@ -231,29 +201,6 @@ def _of_speed(
         if _by_chance(square, freedom, _RATHER):
             break
     return found, excess
-
-
-def _acceleration(cut: Segmentation, impacts: int) -> float:
-    """Return the acceleration towards the stop, unit of the channel per s^2: the median of the flights' parabolas."""
-    signal = cut.signal
-    bends = [
-        2.0
-        * np.polynomial.Polynomial.fit(signal.time[one.index], signal.values[one.index], 2).convert().coef[-1]
-        for one in cut.flights[: impacts - 1]
-        if one.usable
-    ]
-    return float(np.median(bends)) if bends else 0.0
-
-
-def _parabolas(cut: Segmentation, impacts: int) -> Floats:
-    """Return the motion of constant acceleration that is nearest to each flight; NaN elsewhere."""
-    signal = cut.signal
-    found = np.full(len(signal.values), np.nan)
-    for flight in cut.flights[: impacts - 1]:
-        if flight.usable:
-            time, values = signal.time[flight.index], signal.sign * signal.values[flight.index]
-            found[flight.index] = np.polynomial.Polynomial.fit(time, values, 2)(time)
-    return found
 
 
 def natural_frequency_of(stop_position: float, deepest: float, flight_time: float) -> float:

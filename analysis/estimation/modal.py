@@ -19,7 +19,8 @@ from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight, pairs_of
 from vibroimpact.analysis.estimation.noise import noise_level
 from vibroimpact.analysis.estimation.physics import Floats, Forcing, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Signal, segment
+from vibroimpact.analysis.estimation.segments import Flight, segment
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.analysis.estimation.weak_form import (
     linear_estimate,
     robust_weak_form,

@@ -17,7 +17,8 @@ from vibroimpact.analysis.estimation.flight_fit import (
     search_flights,
 )
 from vibroimpact.analysis.estimation.physics import Floats, Forcing, Known, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal, segment_channel
+from vibroimpact.analysis.estimation.segments import Flight, Segmentation, segment_channel
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.analysis.estimation.trajectory import Trajectory, follow
 from vibroimpact.analysis.estimation.weak_form import (
     robust_weak_form,

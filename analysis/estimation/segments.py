@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.estimation.noise import Mask, noise_level, one_sided_window
 from vibroimpact.analysis.estimation.physics import Floats, Known
+from vibroimpact.analysis.estimation.signals import Signal, refuse_other_quantities
 from vibroimpact.analysis.recording import Channel
-from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.fmus.errors import EstimationError
 
@@ -53,43 +53,6 @@ _PART_BEYOND, _BEYOND_OF_SIZE = 0.05, 0.1
 _FEWEST_FREE = 50
 # Samples within this many standard errors of the instant of an impact belong to no flight.
 DOUBTFUL = 2.5
-_OTHER_UNITS = {"m s-1": "a velocity", "m s-2": "an acceleration", "N": "a force"}
-
-
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """A displacement with an upper stop, mirrored where the stop is a lower one.
-
-    Attributes
-    ----------
-    time, values : ndarray of float, shape (sample,)
-        s, unit of the displacement.
-    good : ndarray of bool, shape (sample,)
-        Samples that are plain measurements.
-    interval : float
-        Mean sampling interval, s.
-    sign : float
-        -1 where the signal was mirrored, else 1.
-    noise : float
-        Standard deviation of the noise.
-    """
-
-    time: Floats
-    values: Floats
-    good: Mask
-    interval: float
-    sign: float
-    noise: float
-
-    @property
-    def side(self) -> str:
-        """Where the stop is: `upper` or `lower`."""
-        return "upper" if self.sign > 0.0 else "lower"
-
-    @property
-    def range(self) -> float:
-        """Largest less smallest good sample."""
-        return float(np.ptp(self.values[self.good]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,12 +150,7 @@ def segment_channel(channel: Channel, fastest: float, known: Known, window: floa
         As of `segment`; or the channel is no displacement: velocities jump at impacts, accelerations and forces have
         spikes.
     """
-    si = measured_unit(channel.unit).si
-    if si in _OTHER_UNITS:
-        raise EstimationError(
-            f"{channel.name}: expected a displacement, got {_OTHER_UNITS[si]} ({unit_label(channel.unit)}). "
-            "Measure the displacement, or integrate before the import."
-        )
+    refuse_other_quantities(channel)
     return segment(
         channel.time,
         np.where(channel.good, channel.values, 0.0),

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibroimpact.analysis.estimation.physics import Floats
-from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.analysis.estimation.segments import Flight
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.fmus.errors import EstimationError
 
 _DEGREE = 5

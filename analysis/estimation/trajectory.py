@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight
 from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal
+from vibroimpact.analysis.estimation.segments import Flight, Segmentation
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.fmus.core import motion, next_contact
 from vibroimpact.fmus.errors import EstimationError
 

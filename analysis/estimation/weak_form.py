@@ -22,7 +22,8 @@ import numpy as np
 from numpy.polynomial.legendre import legder, legval
 
 from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.analysis.estimation.segments import Flight
+from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.fmus.errors import EstimationError
 
 #: Power of s (1 - s) in the test functions: high enough for sums of samples to be integrals.

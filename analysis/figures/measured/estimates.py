@@ -16,11 +16,16 @@ _PANEL_MM = 32
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
     """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated."""
-    drawers = {"decay": _draw_decay, "response": _draw_response, "impacts": draw_impact_estimate}
+    drawers = {
+        "decay": _draw_decay,
+        "response": _draw_response,
+        "impacts": draw_impact_estimate,
+        "bounces": draw_impact_estimate,
+    }
     kind = str(dataset.attrs.get("estimates", ""))
     if kind not in drawers:
         raise DatasetError(
-            f"figure: expected estimates of a decay, a response or impacts, got {kind or 'none'!r}. "
+            f"figure: expected estimates of a decay, a response, impacts or bounces, got {kind or 'none'!r}. "
             "Make them with `vibroimpact estimate`."
         )
     with page_style():

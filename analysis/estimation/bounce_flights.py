@@ -1,0 +1,237 @@
+"""The flights of a bouncing body, found as parabolas of one acceleration, or between kinks where they are no parabolas.
+
+Parabolas take all samples of a flight, so they answer where noise is strong or samples are few. Drag, a spring and a
+contact of some length bend flights: kinks make no assumption about their form.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibroimpact.analysis.estimation.bounce_fit import FittedBounces, fitted_bounces
+from vibroimpact.analysis.estimation.estimates import Doubt, MethodEstimate
+from vibroimpact.analysis.estimation.physics import Floats, Known
+from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment_channel
+from vibroimpact.analysis.estimation.signals import refuse_other_quantities, signal_of
+from vibroimpact.analysis.recording import Channel
+from vibroimpact.fmus.errors import EstimationError
+
+FEWEST_FLIGHTS = 3
+# Periods in a record of the fastest smooth motion; windows are shortened until impacts appear.
+_TURNS = 4.0
+# Smallest error of an instant, in sampling intervals.
+_INSTANT = 1e-4
+# Ratio of a flight's length to that of the one before above which impacts in it were not seen ...
+_LONGER = 1.02
+# ... if it is longer by more than this many standard errors.
+_LONGER_BEYOND = 3.0
+# Relative standard error of a length above which the first flight is left out.
+_LEAST_KNOWN = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class BounceFlights:
+    """Successive flights, each shorter than the one before.
+
+    Attributes
+    ----------
+    lengths : ndarray of float, shape (flight,)
+        s.
+    covariance : ndarray of float, shape (flight, flight)
+        Of the logarithms of the lengths: neighbours share the error of an instant.
+    acceleration : float
+        Towards the stop, unit of the channel per s^2; 0 where no flight shows it.
+    impact_times : ndarray of float, shape (impact,)
+        Those that were seen, s.
+    stop_position, stop_error, stop_freedom : float
+        As measured, unit of the channel; standard error and its degrees of freedom.
+    fitted : ndarray of float, shape (sample,)
+        Motion of constant acceleration that is nearest to the flights; NaN elsewhere.
+    facts : dict
+    doubts : tuple of Doubt
+    """
+
+    lengths: Floats
+    covariance: Floats
+    acceleration: float
+    impact_times: Floats
+    stop_position: float
+    stop_error: float
+    stop_freedom: float
+    fitted: Floats
+    facts: dict[str, float | str]
+    doubts: tuple[Doubt, ...] = ()
+
+    def stop(self, confidence: float) -> MethodEstimate:
+        """Return the position of the stop with its interval."""
+        from scipy.stats import t as student
+
+        reach = float(student.ppf(0.5 + confidence / 2.0, self.stop_freedom)) * self.stop_error
+        return MethodEstimate.within(self.stop_position, self.stop_error, reach)
+
+
+def flights_of(channel: Channel, side: str | None, window: float | None) -> BounceFlights:
+    """Return the flights of a channel.
+
+    Parameters
+    ----------
+    channel : Channel
+        Displacement.
+    side : str or None
+        `upper` or `lower` stop; None: as the flights show.
+    window : float or None
+        Of the one-sided fits at kinks, s, which then are taken; None: parabolas, else kinks with a window that suits.
+
+    Raises
+    ------
+    EstimationError
+        The channel is no displacement, or no impacts were found.
+    """
+    refuse_other_quantities(channel)
+    if window is not None:
+        return _between_kinks(channel, side, window)
+    found = fitted_bounces(signal_of(channel), side)
+    parabolas = None if found is None else _of_parabolas(channel, found)
+    enough = parabolas is not None and len(parabolas.lengths) >= FEWEST_FLIGHTS
+    if parabolas is not None and enough and not parabolas.doubts:
+        return parabolas
+    try:
+        kinks = _between_kinks(channel, side, None)
+    except EstimationError:
+        if parabolas is None or not enough:
+            raise
+        return parabolas
+    # parabolas with a doubt are better than too few kinks
+    return parabolas if parabolas is not None and enough and len(kinks.lengths) < FEWEST_FLIGHTS else kinks
+
+
+def _of_parabolas(channel: Channel, found: FittedBounces) -> BounceFlights | None:
+    """Return the flights whose lengths the parabolas tell, up to where one is longer than the one before it."""
+    fit, signal = found.fit, found.signal
+    # the last flight is known by its first half alone: it says when it begins, and hardly when it ends
+    instants = fit.instants[:-1]
+    lengths, step = np.diff(instants), _differences(len(instants))
+    covariance = step @ found.covariance[2:-1, 2:-1] @ step.T
+    covariance += 2.0 * (_INSTANT * signal.interval) ** 2 * np.eye(len(lengths))
+    if not lengths.size:
+        return None
+    # of the first one too little may have been recorded
+    first = int(math.sqrt(covariance[0, 0]) > _LEAST_KNOWN * lengths[0])
+    end = first + _shrinking(lengths[first:], covariance[first:, first:])
+    used, scale = slice(first, end), 1.0 / lengths[first:end]
+    impacts = instants[max(first, 1) : end + 1]
+    return BounceFlights(
+        lengths[used],
+        covariance[used, used] * np.outer(scale, scale),
+        fit.acceleration,
+        impacts,
+        signal.sign * fit.stop,
+        math.sqrt(found.covariance[0, 0]),
+        float(len(found.index) - len(found.covariance)),
+        _fitted(channel, found, instants[first], instants[end]),
+        {
+            "impacts": float(len(impacts)),
+            "noise": found.noise,
+            "acceleration": fit.acceleration,
+            "side": signal.side,
+            "flights from": "parabolas",
+        },
+        () if found.adequate else (_not_parabolas(found.excess),),
+    )
+
+
+def _not_parabolas(excess: float) -> Doubt:
+    return Doubt(
+        f"flights are no parabolas of one acceleration (each by itself takes {excess:.2g} times what chance takes "
+        "from the residuals): drag, a spring, a force, or a contact of some length"
+    )
+
+
+def _fitted(channel: Channel, found: FittedBounces, start: float, end: float) -> Floats:
+    """Return the fitted motion of the flights from start to end; NaN elsewhere."""
+    fitted = np.full(len(channel.time), np.nan)
+    fitted[found.index] = found.signal.sign * found.fit.fitted
+    fitted[(channel.time < start) | (channel.time > end)] = np.nan
+    return fitted
+
+
+def _shrinking(lengths: Floats, covariance: Floats) -> int:
+    """Return how many flights there are up to one that is longer than the one before it, beyond its error."""
+    step = _differences(len(lengths))
+    errors = np.sqrt(np.diag(step @ covariance @ step.T))
+    longer = np.flatnonzero(lengths[1:] > _LONGER * lengths[:-1] + _LONGER_BEYOND * errors)
+    return int(longer[0]) + 1 if longer.size else len(lengths)
+
+
+def _differences(count: int) -> Floats:
+    """Return the matrix that takes differences of neighbours."""
+    found: Floats = np.eye(count)[1:] - np.eye(count)[:-1]
+    return found
+
+
+def _between_kinks(channel: Channel, side: str | None, window: float | None) -> BounceFlights:
+    """Return the flights between kinks, up to where one is longer than the one before it."""
+    fastest = 2.0 * math.pi * _TURNS / float(channel.time[-1] - channel.time[0])
+    cut = segment_channel(channel, fastest, Known(side=side), window)
+    impacts = _falling(cut.impacts)
+    lengths, covariance = _lengths(impacts, cut.signal.interval)
+    levels = cut.signal.sign * np.array([impact.level for impact in impacts])
+    return BounceFlights(
+        lengths,
+        covariance,
+        _acceleration(cut, len(impacts)),
+        np.array([impact.time for impact in impacts]),
+        float(np.mean(levels)),
+        float(np.std(levels, ddof=1)) / math.sqrt(len(levels)),
+        len(levels) - 1.0,
+        _parabolas(cut, len(impacts)),
+        {
+            "impacts": float(len(impacts)),
+            "noise": cut.signal.noise,
+            "window": cut.window,
+            "side": cut.signal.side,
+            "flights from": "kinks",
+        },
+    )
+
+
+def _falling(impacts: tuple[Impact, ...]) -> list[Impact]:
+    """Return the impacts up to where a flight is longer than the one before it."""
+    lengths = np.diff([impact.time for impact in impacts])
+    longer = np.flatnonzero(lengths[1:] > _LONGER * lengths[:-1])
+    return list(impacts[: int(longer[0]) + 2] if longer.size else impacts)
+
+
+def _lengths(impacts: list[Impact], interval: float) -> tuple[Floats, Floats]:
+    """Return the flight times, s, and the covariance of their logarithms: neighbours share the error of an instant."""
+    times = np.array([impact.time for impact in impacts])
+    errors = np.hypot([impact.time_error for impact in impacts], _INSTANT * interval)
+    lengths = np.diff(times)
+    difference = _differences(len(times)) / lengths[:, None]
+    return lengths, difference @ np.diag(errors**2) @ difference.T
+
+
+def _acceleration(cut: Segmentation, impacts: int) -> float:
+    """Return the acceleration towards the stop, unit of the channel per s^2: the median of the flights' parabolas."""
+    signal = cut.signal
+    bends = [
+        2.0
+        * np.polynomial.Polynomial.fit(signal.time[one.index], signal.values[one.index], 2).convert().coef[-1]
+        for one in cut.flights[: impacts - 1]
+        if one.usable
+    ]
+    return float(np.median(bends)) if bends else 0.0
+
+
+def _parabolas(cut: Segmentation, impacts: int) -> Floats:
+    """Return the motion of constant acceleration that is nearest to each flight; NaN elsewhere."""
+    signal = cut.signal
+    found = np.full(len(signal.values), np.nan)
+    for flight in cut.flights[: impacts - 1]:
+        if flight.usable:
+            time, values = signal.time[flight.index], signal.sign * signal.values[flight.index]
+            found[flight.index] = np.polynomial.Polynomial.fit(time, values, 2)(time)
+    return found
