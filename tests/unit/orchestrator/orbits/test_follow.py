@@ -471,12 +471,12 @@ def test_another_key_that_is_left_to_the_sweep_is_asked_for_with_what_to_write(t
 
 
 def test_orbits_of_a_stop_that_keeps_the_body_from_0_need_no_start(tmp_path: Path) -> None:
-    scene = swept_scene(angular_frequency=1.1) | {"stop": [{"position": -0.1, "restitution": 0.7}]}
+    scene = swept_scene(angular_frequency=2.2) | {"stop": [{"position": -0.1, "restitution": 0.7}]}
     scene.pop("sweep")
     written = scene | {"body": scene["body"] | {"displacement_start": -5.0}}  # type: ignore[operator]
     for found, expected in zip(vi.find_orbits(scene, 1), vi.find_orbits(written, 1), strict=True):
         np.testing.assert_array_equal(found.phases, expected.phases)
-    branch = vi.follow(scene, PARAMETER, 1.0, 1.2, step=0.2, doublings=0)
+    branch = vi.follow(scene, PARAMETER, 2.1, 2.3, step=0.2, doublings=0)
     assert vi.Scene.from_text(branch.attrs["scene"]).value("body.displacement_start") == -0.1
     with pytest.raises(SceneError, match="a start on the free side of stop"):
         vi.run(scene)
