@@ -41,6 +41,21 @@ def safe_module_path() -> Iterator[None]:
 
 
 @contextmanager
+def no_library_warns() -> Iterator[None]:
+    """Let no warning of a library be shown by the Python processes that libraries start meanwhile.
+
+    Python's resource tracker is one of them: it warns of the semaphores of a command that was killed, and removes them.
+    Options of a person (`python -W`, PYTHONWARNINGS) come after this one, and so go before it.
+    """
+    before = list(sys.warnoptions)
+    sys.warnoptions.insert(0, "ignore")
+    try:
+        yield
+    finally:
+        sys.warnoptions[:] = before
+
+
+@contextmanager
 def _nameless_main() -> Iterator[None]:
     main = vars(sys.modules["__main__"])
     names = {name: main[name] for name in ("__file__", "__spec__") if main.get(name) is not None}

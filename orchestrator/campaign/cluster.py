@@ -25,13 +25,18 @@ from distributed.utils import get_mp_context
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
-from vibroimpact.fmus.python_child import safe_module_path
+from vibroimpact.fmus.python_child import no_library_warns, safe_module_path
 from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.campaign.surroundings import (
+    LOOPBACK,
+    leave_removed_folder,
+    refuse_poor_surroundings,
+)
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""
@@ -89,7 +94,7 @@ def open_workers(
     Raises
     ------
     UsageError
-        When nothing listens at `scheduler`.
+        When nothing listens at `scheduler`, or this machine lacks what its own workers need.
     CampaignError
         When the workers cannot be started.
     """
@@ -100,12 +105,16 @@ def open_workers(
         # Ctrl-C may come between the making of a coroutine of Dask and its start.
         warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         if scheduler is None:
+            number = workers or processor_count()
+            refuse_poor_surroundings(number)
             stack.enter_context(safe_module_path())
+            stack.enter_context(no_library_warns())
             scratch = stack.enter_context(ScratchFolder("workers"))
+            leave_removed_folder(Path(scratch.name))
             stack.enter_context(
                 dask.config.set({"temporary-directory": scratch.name, START: _prepare_start()})
             )
-            connect = partial(_embedded_cluster, workers or processor_count(), Path(scratch.name))
+            connect = partial(_embedded_cluster, number, Path(scratch.name))
             where = "this machine"
         else:
             address, security = _reached_by(scheduler)
@@ -178,7 +187,7 @@ def _embedded_cluster(workers: int, scratch: Path) -> Iterator[Cluster]:
     cluster = _started_workers(workers, scratch)
     try:
         with Client(cluster, set_as_default=False) as client:
-            yield Cluster(client, workers, lambda: _replace_dead_workers(cluster, workers))
+            yield Cluster(client, workers, lambda: _replace_dead_workers(cluster, workers, scratch))
     except BaseException:
         # A worker may be deep in a long call; what it computes is not wanted any more.
         _kill_workers(cluster)
@@ -198,9 +207,9 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
                     n_workers=workers,
                     threads_per_worker=1,
                     processes=True,
-                    host="127.0.0.1",
+                    host=LOOPBACK,
                     # None would still open the usual port of a Dask dashboard, to the whole network.
-                    dashboard_address="127.0.0.1:0",
+                    dashboard_address=f"{LOOPBACK}:0",
                     scheduler_kwargs={"dashboard": False},
                     protocol="tls://",
                     security=_own_certificates(scratch),
@@ -252,8 +261,9 @@ def _own_certificates(folder: Path) -> Security:
     return Security(require_encryption=True, tls_ca_file=str(certificate), **names)
 
 
-def _replace_dead_workers(cluster: LocalCluster, workers: int) -> None:
+def _replace_dead_workers(cluster: LocalCluster, workers: int, scratch: Path) -> None:
     """Start as many new workers as are dead for good: those killed while they were started again."""
+    leave_removed_folder(scratch)
     living = sum(nanny.is_alive() for nanny in cluster.workers.values())
     if living < workers:
         cluster.scale(len(cluster.worker_spec) + workers - living)

@@ -10,9 +10,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.python_child import ending, safe_module_path
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.fmus.python_child import ending, no_library_warns, safe_module_path
+from vibroimpact.orchestrator.campaign.surroundings import leave_removed_folder
 
 POLL_SECONDS = 0.5
 """How often the waiting process looks up, s."""
@@ -40,7 +43,13 @@ def call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_answer, args=(sender, function, arguments), daemon=True)
-    with safe_module_path(), interrupts_blocked():
+    with (
+        safe_module_path(),
+        no_library_warns(),
+        ScratchFolder("current-folder") as scratch,
+        interrupts_blocked(),
+    ):
+        leave_removed_folder(Path(scratch.name))
         process.start()
     sender.close()
     try:

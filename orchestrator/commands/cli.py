@@ -13,11 +13,14 @@ import errno
 import functools
 import gc
 import inspect
+import logging
+import os
 import signal
 import sys
 import threading
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import metadata
@@ -29,7 +32,7 @@ import typer
 from typer.core import TyperGroup
 from typer.models import CommandInfo
 
-from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.printable import printable
 from vibroimpact.fmus.terminal import all_was_written, say
@@ -67,6 +70,7 @@ PANELS = {
 """The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""
 DEBUG = "--debug"
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+_FEW_DESCRIPTORS = frozenset({errno.EMFILE, errno.ENFILE})
 _IMPORTING = "<frozen importlib._bootstrap>"
 _COLLECT_AFTER = 10_000
 """Objects after which garbage is looked for; Python's own number is 700 or 2000."""
@@ -190,6 +194,22 @@ def _no_vain_collections() -> Iterator[None]:
 
 
 @contextmanager
+def _no_library_warns() -> Iterator[None]:
+    """Show no warning of a library: its reader is a developer, and what a person should know a command says itself.
+
+    The filter comes last, so that `python -W`, PYTHONWARNINGS and tests have their way.
+    """
+    silent = logging.NullHandler()
+    logging.getLogger().addHandler(silent)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", append=True)
+            yield
+    finally:
+        logging.getLogger().removeHandler(silent)
+
+
+@contextmanager
 def _no_interrupt_is_lost() -> Iterator[None]:
     """Let an interrupt that would be lost come a moment later.
 
@@ -242,7 +262,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         for word in given:
             refuse_no_text(word)
-        with _no_interrupt_is_lost(), _no_vain_collections(), command_line():
+        with _no_interrupt_is_lost(), _no_vain_collections(), _no_library_warns(), command_line():
             load_commands()
             # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
             typer.main.get_command(_with_called(given)).main(args=given, prog_name="vibroimpact")
@@ -253,8 +273,42 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Exception as error:
         if DEBUG in given:
             say(traceback.format_exc(), err=True)
+        error = _of_surroundings(error) or error
         say(_words(error, debug=DEBUG in given), err=True)
         sys.exit(error.exit_code if isinstance(error, VibroimpactError) else 1)
+
+
+def _of_surroundings(error: Exception) -> UsageError | None:
+    """Return the error that says what surrounds the command where that caused another error; None elsewhere."""
+    causes = list(_causes(error))
+    numbers = {cause.errno for cause in causes if isinstance(cause, OSError)}
+    # A compiled module that cannot be opened is an ImportError, which has the words alone.
+    if numbers & _FEW_DESCRIPTORS or os.strerror(errno.EMFILE) in str(error):
+        return UsageError(
+            "this machine: expected another file that may be opened, got too many open ones. "
+            "Raise the limit (`ulimit -n 1024`), or end other programs."
+        )
+    if errno.ENOENT in numbers and not isinstance(error, VibroimpactError) and _no_current_folder():
+        return UsageError(
+            "current folder: expected one that exists, got one that was removed. "
+            "Change to another, or give absolute paths."
+        )
+    return None
+
+
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error, what it came from, and so on."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
+
+
+def _no_current_folder() -> bool:
+    try:
+        os.getcwd()
+    except OSError:
+        return True
+    return False
 
 
 def _words(error: Exception, *, debug: bool) -> str:
