@@ -18,7 +18,7 @@ try:
     import nidaqmx
     from nidaqmx import constants, stream_readers, stream_writers
     from nidaqmx._stubs import nidaqmx_pb2
-    from nidaqmx.error_codes import DAQmxErrors
+    from nidaqmx.error_codes import DAQmxErrors, DAQmxWarnings
     from nidaqmx.errors import DaqError, DaqNotFoundError, RpcError
     from nidaqmx.system import System
 except ImportError as _missing:
@@ -44,6 +44,7 @@ __all__ = [
     "METHODS",
     "SERVICE",
     "DAQmxErrors",
+    "DAQmxWarnings",
     "DaqError",
     "DaqNotFoundError",
     "RpcError",

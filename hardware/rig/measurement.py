@@ -18,6 +18,7 @@ from vibroimpact.hardware.rig.acquisition import Block, Facts, Gap
 from vibroimpact.hardware.rig.calibration import Calibration
 from vibroimpact.hardware.rig.inputs import Input
 from vibroimpact.hardware.rig.opening import Rig
+from vibroimpact.hardware.rig.quiet import quiet_remark
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.uint8]
@@ -202,7 +203,8 @@ def recording_of(
         place = int(np.searchsorted(numbers, block.first))
         volts[:, place : place + block.volts.shape[1]] = block.volts
     channels = _channels(measurement, numbers, volts, started_at)
-    said = [*_clipped(channels), *_lost(measurement, gaps, filled), *remarks]
+    quiet = [] if measurement.pulses is not None else _quiet(measurement, volts)
+    said = [*_clipped(channels), *quiet, *_lost(measurement, gaps, filled), *remarks]
     return Recording(channels, attrs=_attributes(measurement, gaps, started_at, said))
 
 
@@ -259,6 +261,15 @@ def _clipped(channels: Mapping[str, Channel]) -> list[str]:
         for name, channel in channels.items()
     }
     return [f"{name}: {_samples(count)} clipped" for name, count in counts.items() if count]
+
+
+def _quiet(measurement: Measurement, volts: Floats) -> list[str]:
+    """Return a line for each channel that shows nothing above its noise."""
+    lines = (
+        quiet_remark(each.name, row, each.step, each.role == "loopback")
+        for each, row in zip(measurement.inputs, volts, strict=True)
+    )
+    return [line for line in lines if line]
 
 
 def _samples(count: int) -> str:

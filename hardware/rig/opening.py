@@ -26,6 +26,13 @@ ASKED_WRONGLY = (
 """What a rig says of a device, a channel, a range or a rate that it does not have, and of a channel given twice."""
 
 
+HELD = (
+    ". A program that died leaves its task on the device: end the program that holds it, or reset the device "
+    "(nidaqmx.system.Device.reset_device, NI MAX)"
+)
+"""What is said where another task holds an input or output."""
+
+
 @dataclass(frozen=True, slots=True)
 class Rig:
     """A rig that is open.
@@ -82,7 +89,8 @@ def refusal_of(choice: str | None, error: Exception) -> VibroimpactError:
         return UsageError(f"rig: expected the driver NI-DAQmx on this machine, got none. {THREE_WAYS}.")
     if isinstance(error, daqmx.DaqError):
         kind = UsageError if error.error_code in ASKED_WRONGLY else RigError
-        return kind(f"{choice or 'local'}: {_one_line(error)}")
+        held = error.error_code == daqmx.DAQmxErrors.PAL_RESOURCE_RESERVED
+        return kind(f"{choice or 'local'}: {_one_line(error)}{HELD if held else ''}")
     return RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.")
 
 

@@ -81,7 +81,7 @@ TASK: dict[int, Callable[[Task], Any]] = {
 }
 TIMING: dict[int, Callable[[Task], Any]] = {
     0x1347: lambda task: SAMPLE_CLOCK if task.clocked else ON_DEMAND,
-    0x1344: lambda task: task.timing.rate,
+    0x1344: lambda task: task.clock_rate if task.clocked else task.timing.rate,
     0x1300: lambda task: task.timing.mode,
     0x1310: lambda task: task.timing.samples,
     0x1852: lambda task: task.timing.source or f"/{task.device}/{_word(task)}/SampleClockTimebase",

@@ -16,7 +16,7 @@ from vibroimpact.hardware.virtual_rig.checks import refuse_outside_clock, verify
 from vibroimpact.hardware.virtual_rig.pace import Pace
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
-from vibroimpact.hardware.virtual_rig.refusal import Refusal
+from vibroimpact.hardware.virtual_rig.refusal import STOPPED_BEFORE_DONE, Refusal
 from vibroimpact.hardware.virtual_rig.sampling import Sampling
 from vibroimpact.hardware.virtual_rig.scene_plant import opened_plant
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
@@ -265,7 +265,7 @@ class Board:
         """Return the rate that the clock of a task has, Hz."""
         assert task.clock is not None
         error = self.analog.inputs.clock_error if task.kind == INPUT else 0.0
-        return task.clock.rate * (1.0 + 1e-6 * error)
+        return task.clock_rate * (1.0 + 1e-6 * error)
 
     # ---- states of tasks ----
 
@@ -275,7 +275,7 @@ class Board:
         mine = self._resources(task)
         for other in self.tasks.values():
             if other is not task and other.state is not State.verified and mine & self._resources(other):
-                raise Refusal(DAQmxErrors.PAL_RESOURCE_RESERVED, f"{task.name} by {other.name}")
+                raise Refusal(DAQmxErrors.PAL_RESOURCE_RESERVED, f"{task.name} by {other.holder}")
         if task.state is State.verified:
             task.state = State.reserved
 
@@ -308,8 +308,8 @@ class Board:
             self._wake()
             return started
 
-    def stop(self, task: Task) -> None:
-        """Stop a task; an output holds its last value.
+    def stop(self, task: Task) -> int:
+        """Stop a task; an output holds its last value. Return the status: a warning where a finite task is not done.
 
         Raises
         ------
@@ -319,18 +319,34 @@ class Board:
         with self.changed:
             self.catch_up()
             failure = task.failure if task.kind == OUTPUT else None
+            early = task.state is State.running and task.needed is not None and not task.done
+            self.abort(task)
+            if failure is not None:
+                raise failure
+            return STOPPED_BEFORE_DONE if early else 0
+
+    def abort(self, task: Task) -> None:
+        """Stop a task whatever it failed with; an output holds its last value."""
+        with self.changed:
+            self.catch_up()
             self._terminals.end_followers(task)
             task.stop()
             task.failure = None
             self.changed.notify_all()
-            if failure is not None:
-                raise failure
+
+    def reset(self) -> None:
+        """Give back all that tasks hold; outputs go to 0. What a task has failed with is forgotten."""
+        with self.changed:
+            for task in self.tasks.values():
+                task.kept = False
+                self.abort(task)
+            self.analog.held[:] = 0.0
 
     def remove(self, task: Task) -> None:
         """Forget a task; those who listen to it hear no more."""
         with self.changed:
             with suppress(Refusal):
-                self.stop(task)
+                self.abort(task)
             for stream in (task.every, task.ended):
                 if stream is not None:
                     stream.heard.put(None)

@@ -94,7 +94,7 @@ class Calls(Reads, Writes, Listening):
 
     def do_stop_task(self, request: Any, response: Any) -> None:
         """Stop a task."""
-        self._board.stop(self._task(request))
+        response.status = self._board.stop(self._task(request))
 
     def do_task_control(self, request: Any, response: Any) -> None:
         """Start, stop, reserve or give back a task."""
@@ -105,7 +105,7 @@ class Calls(Reads, Writes, Listening):
                 self._board.start(task)
             elif action in (modes.TASK_STOP.value, modes.TASK_ABORT.value):
                 task.kept = task.kept and action == modes.TASK_STOP.value
-                self._board.stop(task)
+                response.status = self._board.stop(task)
             elif action in (modes.TASK_RESERVE.value, modes.TASK_COMMIT.value):
                 self._board.reserve(task)
                 task.kept = True
@@ -241,11 +241,7 @@ class Calls(Reads, Writes, Listening):
     def do_reset_device(self, request: Any, response: Any) -> None:
         """End all tasks; outputs go to 0."""
         self._refuse_other_device(request.device_name)
-        with self._board.changed:
-            for task in list(self._board.tasks.values()):
-                task.kept = False
-                self._board.stop(task)
-            self._board.analog.held[:] = 0.0
+        self._board.reset()
 
     def do_self_test_device(self, request: Any, response: Any) -> None:
         """Say that the device is there."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from vibroimpact.hardware.daqmx import constants
+
+TIMEBASE = 100e6
+"""Clock of which sample clocks are whole fractions, Hz, as in NI's X Series."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,19 @@ class Profile:
     def highest_rate(self, channels: int) -> float:
         """Return the highest sample rate of so many inputs, Hz."""
         return self.conversion_rate if self.simultaneous else self.conversion_rate / max(channels, 1)
+
+    @staticmethod
+    def clock_rate(rate: float, highest: float) -> float:
+        """Return the rate of the sample clock that is nearest to a rate and not above the highest one, Hz.
+
+        Examples
+        --------
+        >>> round(Profile.clock_rate(44_100.0, 1e6), 1), Profile.clock_rate(5000.0, 1e6)
+        (44091.7, 5000.0)
+        """
+        # a rate of 1e9 / 3 is rounded itself: a divisor of 3.0000000004 is 3
+        least = math.ceil(TIMEBASE / highest * (1.0 - 1e-12))
+        return TIMEBASE / max(round(TIMEBASE / rate), least)
 
     def skew(self) -> float:
         """Return the time between the samples of two neighbouring inputs, s."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from vibroimpact.hardware.daqmx import DAQmxErrors
+from vibroimpact.hardware.daqmx import DAQmxErrors, DAQmxWarnings
 
+STOPPED_BEFORE_DONE = int(DAQmxWarnings.STOPPED_BEFORE_DONE.value)
 TEXTS = {
+    DAQmxWarnings.STOPPED_BEFORE_DONE: "A finite task was stopped before all of its samples were there",
     DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE: "The program read too late: samples were overwritten in the input buffer. "
     "Read more often or enlarge the buffer",
     DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES: "The output ran out of samples and stopped. Write more "
@@ -98,6 +100,7 @@ def text_of(code: int) -> str:
     """
     known: dict[int, str] = {int(error.value): text for error, text in TEXTS.items()}
     names: dict[int, str] = {
-        int(error.value): error.name.replace("_", " ").capitalize() for error in DAQmxErrors
+        int(error.value): error.name.replace("_", " ").capitalize()
+        for error in (*DAQmxWarnings, *DAQmxErrors)
     }
     return known.get(code, names.get(code, ""))

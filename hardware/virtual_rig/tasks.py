@@ -168,6 +168,19 @@ class Task:
         """Its sample clock; None: it reads and writes on demand."""
         return self.timing if self.clocked else None
 
+    @property
+    def clock_rate(self) -> float:
+        """Rate of its sample clock, Hz: the timebase over the whole number that is nearest to the rate asked for."""
+        return self.profile.clock_rate(self.timing.rate, self.highest_rate)
+
+    @property
+    def holder(self) -> str:
+        """The task in words, as one that holds what another one needs: name, channels, and what it does."""
+        word = "ai" if self.kind == INPUT else "ao"
+        names = ", ".join(f"{self.device}/{word}{channel.number}" for channel in self.channels)
+        doing = "runs" if self.state is State.running and not self.done else "is reserved"
+        return f"task {self.name!r}, which {doing} ({names})"
+
     def set_clock(self, clock: Clock) -> None:
         """Give the task a sample clock; `checks.verify` refuses what the device does not have of it."""
         self.refuse_running()

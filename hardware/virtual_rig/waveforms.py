@@ -33,7 +33,7 @@ def put_waveforms(response: Any, task: Task, volts: Floats, mode: int, served_at
         waveform.y_data.extend(volts[place].tolist())
         if mode & _TIMING and task.clock is not None:
             first = int(task.edge(task.position - count)) + place * task.skew if count else 0
-            waveform.dt = 1.0 / task.clock.rate
+            waveform.dt = 1.0 / task.clock_rate
             whole, part = divmod(round(served_at / TICK) + first, round(1.0 / TICK))
             waveform.t0.seconds = whole + _SECONDS_TO_1970
             waveform.t0.fractional_seconds = int(part * TICK * 2.0**64)

@@ -137,7 +137,8 @@ def in_real_time(address: str, server: psutil.Process, seconds: float) -> RealTi
             task.stop()
             drive.stop()
             task.register_every_n_samples_acquired_into_buffer_event(EVERY, None)
-    due = np.arange(len(events)) * EVERY / RATE
+    # the clock of the rig is a whole fraction of 100 MHz
+    due = np.arange(len(events)) * EVERY * (round(100e6 / RATE) / 100e6)
     start = float(np.min(np.array(events) - due))
     return RealTime(
         (after[0] - before[0]) / passed,

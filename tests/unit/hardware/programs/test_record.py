@@ -216,3 +216,12 @@ def test_channels_of_a_multiplexed_device_have_axes_of_their_own() -> None:
     found = record(f"virtual:{ROOT}/examples/rig/beam.toml", ["tip=Dev1/ai0", "speed=Dev1/ai1"], 1000.0, 0.05)
     tip, speed = found.channel("tip"), found.channel("speed")
     np.testing.assert_allclose(speed.time - tip.time, 12e-6, rtol=0.01)
+
+
+def test_a_loopback_without_a_drive_and_a_channel_within_its_noise_are_said(rig: Rig) -> None:
+    still = record(rig, ["tip=Dev1/ai0,2"], 5000.0, 0.5, loopback=["back=Dev1/ai2"])
+    assert any(line.startswith("back: the loopback shows no drive (") for line in still.remarks)
+    assert any(line.startswith("tip: nothing is above its noise (") for line in still.remarks)
+    with driven(rig, 1.0, 10.0):
+        moving = record(rig, ["tip=Dev1/ai0,2"], 5000.0, 0.5, loopback=["back=Dev1/ai2"])
+    assert not any("loopback" in line or "above its noise" in line for line in moving.remarks)

@@ -120,6 +120,7 @@ def test_a_resource_belongs_to_one_task(bench: Bench) -> None:
         first.start()
         with refused(-50103):
             second.start()
+        # a continuous task is stopped by a person alone: no warning
         first.stop()
         second.start()
 

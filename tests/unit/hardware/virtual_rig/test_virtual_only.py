@@ -14,7 +14,8 @@ from support.rig_bench import BITS_16, CONTINUOUS, Bench, opened_bench, refused
 
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.hardware.daqmx import METHODS, System, grpc, open_channel
+from vibroimpact.hardware.daqmx import METHODS, DaqError, System, constants, grpc, message_class, open_channel
+from vibroimpact.hardware.rig.opening import refusal_of
 from vibroimpact.hardware.virtual_rig.serving import served
 from vibroimpact.hardware.virtual_rig.settings import read_rig
 
@@ -216,3 +217,70 @@ def test_every_call_of_the_protocol_is_answered_or_refused_in_words(bench: Bench
             metadata[name] = dict(error.trailing_metadata() or ())
     assert set(METHODS) - set(metadata) == {"CreateTask", "GetErrorString"}
     assert [name for name, said in metadata.items() if int(said.get("ni-error", 0)) > -1000] == []
+
+
+def status_of_stop(task: Any) -> int:
+    """Return the status with which the server stops a task: NI's client drops it."""
+    request = message_class(METHODS["StopTask"].input_type)(task=task._handle)
+    return int(task._interpreter._client.StopTask(request).status)
+
+
+def test_a_finite_task_that_is_stopped_early_is_warned_of_and_one_that_is_done_is_not(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0", 1000.0, samps_per_chan=100) as task:
+        task.start()
+        assert status_of_stop(task) == 200010
+        task.start()
+        assert len(task.read(100)) == 100
+        assert status_of_stop(task) == 0
+    with bench.inputs("Dev1/ai0", 1000.0, sample_mode=CONTINUOUS) as task:
+        task.start()
+        assert status_of_stop(task) == 0
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"),
+    [(44_100.0, 100e6 / 2268), (60_000.0, 100e6 / 1667), (5000.0, 5000.0), (1_000_000.0, 1_000_000.0)],
+)
+def test_sample_clocks_are_whole_fractions_of_the_timebase(bench: Bench, asked: float, given: float) -> None:
+    with bench.inputs("Dev1/ai0", asked, samps_per_chan=1000) as task:
+        assert task.timing.samp_clk_rate == given
+        before = bench.control.state()["time"]
+        task.read(1000)
+        # the last of 1000 samples comes 999 intervals after the first
+        assert bench.control.state()["time"] - before == pytest.approx(999 / given, abs=3e-4)
+
+
+def test_a_rate_is_never_rounded_above_the_highest(bench: Bench) -> None:
+    with bench.task() as task:
+        task.ao_channels.add_ao_voltage_chan("Dev1/ao0")
+        task.timing.cfg_samp_clk_timing(900_000.0)
+        assert task.timing.samp_clk_rate == 100e6 / 112
+
+
+def test_reset_device_ends_tasks_that_have_failed_without_saying_so_again(bench: Bench) -> None:
+    with bench.task() as drive, bench.inputs("Dev1/ai0", 1000.0, sample_mode=CONTINUOUS) as task:
+        drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
+        drive.timing.cfg_samp_clk_timing(1000.0, sample_mode=CONTINUOUS)
+        drive.out_stream.regen_mode = constants.RegenerationMode.DONT_ALLOW_REGENERATION
+        drive.write(np.full(1000, 2.0))
+        drive.start()
+        task.start()
+        bench.control.advance(0.2)
+        assert bench.control.starve() == 1
+        System.remote(bench.options()).devices["Dev1"].reset_device()
+        assert bench.control.truth()["outputs"][0] == 0.0
+        # nothing holds the inputs any more
+        with bench.inputs("Dev1/ai1", 1000.0, samps_per_chan=10) as other:
+            assert len(other.read(10)) == 10
+
+
+def test_a_refusal_of_what_is_reserved_names_who_holds_which_channels(bench: Bench) -> None:
+    with bench.task("first") as first, bench.inputs("Dev1/ai1", 1000.0) as second:
+        first.ai_channels.add_ai_voltage_chan("Dev1/ai0, Dev1/ai3", min_val=-10, max_val=10)
+        first.timing.cfg_samp_clk_timing(1000.0, sample_mode=CONTINUOUS)
+        first.start()
+        with pytest.raises(DaqError, match=r"by task 'first', which runs \(Dev1/ai0, Dev1/ai3\)") as refusal:
+            second.start()
+        said = str(refusal_of("grpc://rig", refusal.value))
+        assert "\n" not in said
+        assert "A program that died leaves its task on the device" in said
