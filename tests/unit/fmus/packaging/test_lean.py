@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from lxml import etree
 from support.component_fmu import VERSIONS, ComponentFmu
 from support.exports import exported
+from support.integrated import Integrated
 
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import UsageError
@@ -315,3 +316,15 @@ def test_any_start_values_have_an_experiment_that_ends(name: str, data: st.DataO
     experiment = default_experiment(name, starts)
     assert 0.0 < experiment.step_size < experiment.stop_time < math.inf
     assert experiment.stop_time / experiment.step_size <= 1.1 * MOST_STEPS
+
+
+@pytest.mark.parametrize(("external", "named"), [(False, False), (True, True)])
+def test_a_law_that_there_is_not_is_refused_by_the_laws_of_the_description(
+    tmp_path: Path, external: bool, named: bool
+) -> None:
+    path = export_fmu("oscillator", tmp_path / "o.fmu", external=external)
+    it = Integrated("Oscillator", "3.0", path, "CoSimulation")
+    it.set({"contact[1].law": 99})
+    message = it.message(it.fmu.exitInitializationMode)
+    assert "4 (hunt_crossley)" in message
+    assert ("5 (external)" in message) == named
