@@ -43,7 +43,7 @@ _MOST_LINES, _TICKS_FROM = 25, 0.94
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
 _CONTACT_FORCE = re.compile(r"contact_force(?:_([0-9]+))?$")
 # First instant, over the width of the panel, above which time counts from it.
-_LATE = 2.0
+_LATE = 10.0
 # What happens at an instant, and the variable with its times.
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 

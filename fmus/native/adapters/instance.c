@@ -13,6 +13,9 @@ static const vi_component *const component = &vi_this_component;
 /* Largest amount by which a step may pass the stop time: the rounding of an importer's sums, relative to 1 + |time|. */
 #define STOP_ROUNDING 1e-9
 
+/* States of a body: a displacement and a velocity of each mode. */
+enum { MOST_STATES = 2 * VI_MODES };
+
 /* ---- life ---- */
 
 bool vi_token_fits(const char *token)
@@ -367,7 +370,7 @@ static size_t place_of_state(const vi_instance *instance, uint32_t own)
 bool vi_instance_set(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      const void *values, size_t value_count, vi_convert convert)
 {
-    double states[VI_MOST_STATES];
+    double states[MOST_STATES];
     bool changes_states = false;
     size_t first = 0;
     for (size_t i = 0; i < n; ++i) {

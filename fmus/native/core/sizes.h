@@ -11,6 +11,5 @@
 #ifndef VI_ONLY_MODES
 #define VI_ONLY_MODES 0 /* the one number of modes that its bodies have, which costs no loops then; 0: any up to VI_MODES */
 #endif
-enum { VI_MOST_STATES = 2 * VI_MODES }; /* of a structure: a displacement and a velocity of each mode */
 
 #endif
