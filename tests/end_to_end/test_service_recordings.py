@@ -179,7 +179,7 @@ def test_many_uploads_at_once_are_all_answered(served: Served, raw: httpx.Client
     statuses: list[int] = []
 
     def upload(number: int) -> None:
-        answer = raw.post(f"/recordings?name=many{number}.tdms", content=b"TDSm" * 1000, timeout=120.0)
+        answer = raw.post(f"/recordings?name=many{number}.tdms", content=b"TDSm" * 1000, timeout=600.0)
         statuses.append(answer.status_code)
 
     threads = [threading.Thread(target=upload, args=(number,)) for number in range(8)]

@@ -31,8 +31,8 @@ ASKED = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
 OWN = ASKED.replace(b"/ ", b"/own ")
 """As one who has the token asks."""
 LARGE = ASKED.replace(b"/ ", b"/large ")
-BODY = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\n"
-CHUNKED = BODY.replace(b"Content-Length: 1000000", b"Transfer-Encoding: chunked")
+BODY = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 400000\r\n\r\n"
+CHUNKED = BODY.replace(b"Content-Length: 400000", b"Transfer-Encoding: chunked")
 REFUSED = BODY.replace(b"/ ", b"/refused ")
 LENGTH = 16_000_000
 """Of the large answer, byte: more than the buffers of a connection hold."""
@@ -199,7 +199,7 @@ def test_who_has_the_token_keeps_the_connection_while_strangers_come(listening: 
     own.sendall(BODY)  # and is slow with what follows
     for _ in range(3 * MOST):
         listening.open(SILENT)
-    own.sendall(bytes(1_000_000))
+    own.sendall(bytes(400_000))
     assert b" 200 " in own.recv(100)
 
 
