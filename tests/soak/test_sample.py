@@ -12,7 +12,7 @@ from soak._runner import run
 
 BASE_SEED = 11
 # of seconds of processor time a case; tests/unit has shorter tests of each
-DEAR = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests"}
+DEAR = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests", "service_strangers"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] * (n in DEAR)) for n in names()])
