@@ -259,7 +259,7 @@ def _normal_equations(time: Floats, residual: Floats, unknown: Floats) -> tuple[
 
 def _longest_chain(points: Points, pieces: Sequence[Piece], sign: float) -> list[Piece]:
     """Return the longest chain of neighbouring pieces that are flights between impacts on one stop."""
-    pairs = [k for k in range(len(pieces) - 1) if _is_impact(points, *pieces[k : k + 2], sign)]
+    pairs = [k for k in range(len(pieces) - 1) if _is_impact(points, pieces[k], pieces[k + 1], sign)]
     pairs.sort(key=lambda k: -(pieces[k].count + pieces[k + 1].count))
     best: list[Piece] = []
     used: set[int] = set()
@@ -286,7 +286,7 @@ def _grown(points: Points, pieces: Sequence[Piece], k: int, sign: float) -> tupl
 def _joins(points: Points, chain: Sequence[Piece], last: bool, sign: float) -> bool:
     """Tell whether the last (else the first) piece of a chain is a flight beyond an impact, and follows the others."""
     inner = chain[-2:] if last else chain[:2]
-    return _is_impact(points, *inner, sign) and _follows(points, chain, last, sign)
+    return _is_impact(points, inner[0], inner[1], sign) and _follows(points, chain, last, sign)
 
 
 def _is_impact(points: Points, one: Piece, other: Piece, sign: float) -> bool:

@@ -103,7 +103,7 @@ OTHERS: Rows = {
     "import signal.csv --rate 100 --unit m -o signal.nc": (ASKED, 0),
     "estimate decay signal.nc": (ASKED, 0),
     "estimate impacts run.nc --angular-frequency 0.9 --channel displacement": (ASKED, 0),
-    "estimate bounces signal.nc": (ASKED, 2),
+    "estimate bounces signal.nc": (ASKED, 1),
     "estimate response signal.nc --drive absent": (ASKED, 2),
     "spikes signal.nc": (ASKED, 0),
     "fmu replay signal.nc -o signal.fmu": (ASKED, 0),

@@ -186,8 +186,8 @@ def test_a_window_of_the_phase_plane_and_of_the_impacts_is_one_of_time() -> None
         len(figures.draw(dataset, "return-map", start=20.0, stop=25.0).axes[0].get_lines()[0].get_xdata())
         == 9
     )
-    whole = figures.draw(dataset, "portrait").axes[0].get_lines()[0].get_xdata()
-    part = figures.draw(dataset, "portrait", periods=2).axes[0].get_lines()[0].get_xdata()
+    whole = figures.draw(dataset, "portrait", periods=20).axes[0].get_lines()[0].get_xdata()
+    part = figures.draw(dataset, "portrait", periods=1).axes[0].get_lines()[0].get_xdata()
     assert len(part) < len(whole) / 15
 
 

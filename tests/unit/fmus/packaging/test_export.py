@@ -91,7 +91,9 @@ def test_an_export_moves_as_the_component_that_it_was_made_from(tmp_path: Path) 
 def test_only_what_was_asked_for_is_written_into_the_resources(tmp_path: Path) -> None:
     path = export_fmu("Beam", tmp_path / "b.fmu", modes=8, contacts=2, sensors=1)
     assert (unpack(path).folder / STARTS_MEMBER).read_text().endswith(" bf50624dd2f1a9fc\n")
-    assert (unpack(path).folder / SIZES_MEMBER).read_text() == "modes 8\ncontacts 2\nsensors 1\nexternal_laws 0\n"
+    assert (
+        unpack(path).folder / SIZES_MEMBER
+    ).read_text() == "modes 8\ncontacts 2\nsensors 1\nexternal_laws 0\n"
     bare = export_fmu("Beam", tmp_path / "all.fmu", full=True)
     assert not any((unpack(bare).folder / member).exists() for member in (SIZES_MEMBER, STARTS_MEMBER))
     assert bare.read_bytes() == fmu_path("Beam").read_bytes()

@@ -108,9 +108,10 @@ def test_a_shock_that_a_laboratory_measured_is_on_an_input_as_if_it_were_live(tm
         opened_bench(rig(tmp_path, wires)) as bench,
         bench.inputs("Dev1/ai3", 51_200.0, samps_per_chan=51_200) as task,
     ):
-        seen = np.array(task.read(51_200))
+        seen, rate = np.array(task.read(51_200)), task.timing.samp_clk_rate
+    assert rate == 1e8 / 1953, "100 MHz over a whole number"
     delay = float(channel.time[0]) - min(float(each.time[0]) for each in board.channels.values())
-    at = np.arange(51_200) / 51_200.0 + float(channel.time[0]) - delay
+    at = np.arange(51_200) / rate + float(channel.time[0]) - delay
     played = volts_per * np.interp(at, channel.time, channel.values)
     # instants of a rig are whole nanoseconds: a steep flank is that much away
     np.testing.assert_allclose(seen, played, atol=0.51 * STEP + 1e-3)
