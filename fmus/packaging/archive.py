@@ -28,6 +28,7 @@ from vibroimpact.fmus.packaging.zip_members import (
     damaged,
     is_folder,
     opened,
+    place_of,
     zip_in,
 )
 from vibroimpact.fmus.private_folder import (
@@ -37,7 +38,7 @@ from vibroimpact.fmus.private_folder import (
     refuse_links,
     refuse_unsafe,
 )
-from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.fmus.safe_xml import refuse_large, root_of
 
 #: Most bytes of a model identifier: with an ending it is the name of a file.
 LONGEST_IDENTIFIER = 240
@@ -102,18 +103,27 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
     Raises
     ------
     ComponentFileError
-        It is missing, no zip, unsafe, of more than `limit` bytes when unpacked, or its description is not one of FMI
-        2.0 or 3.0.
+        It is missing, no zip, unsafe, of more than `limit` bytes when unpacked, or its description is too large or not
+        one of FMI 2.0 or 3.0.
     """
     path = Path(path)
     with opened(path) as file, zip_in(path, file) as archive:
         file.seek(0)
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         members = checked_members(path, archive, limit)
+        _refuse_large_xml(path, members)
         folder = _cache(path) / digest
         if not _is_intact(folder, archive, members):
             _unpack_into_place(path, archive, members, folder)
     return _described(path, folder, digest)
+
+
+def _refuse_large_xml(path: Path, members: list[zipfile.ZipInfo]) -> None:
+    """Raise ComponentFileError where a file that tools parse is too large to be given to a parser."""
+    for member in members:
+        name = "/".join(place_of(member))
+        if name in PARSED_XML:
+            refuse_large(member.file_size, f"{path}: {name}")
 
 
 def binary_path(fmu: UnpackedFmu) -> Path:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -30,6 +30,11 @@ _SAYS_CUT_OFF = re.compile(
 )
 _CUT_OFF = "the file is cut off: its last segment holds less data than it declares, and what is there is read"
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
+_SCALE_NUMBER = re.compile(r"NI_Scale\[(\d+)\]")
+_COEFFICIENTS = re.compile(r"NI_Scale\[\d+\]_Polynomial_Coefficients_Size")
+_SCALES = "NI_Number_Of_Scales"
+_MOST_SCALES = 100
+"""Scales of one channel, and coefficients of one polynomial: npTDMS loops as often as a file says, NI writes a few."""
 _EPOCH_ENDS = np.datetime64("1904-01-02")
 
 
@@ -79,6 +84,8 @@ def _read(file: Any, size: int) -> RawFile:
     channels = [channel for group in groups for channel in group.channels()]
     if len(channels) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} channels, got {len(channels)}.")
+    for holder in (file, *groups, *channels):
+        _refuse_many_scales(holder.properties)
     declared = sum(len(channel) for channel in channels)
     if declared > size:  # nothing in this format is compressed: a sample is a byte at least
         raise DatasetError(
@@ -99,6 +106,22 @@ def _read(file: Any, size: int) -> RawFile:
     if origin is not None:
         attrs["source_date"] = str(np.datetime_as_string(origin, unit="us"))
     return RawFile("TDMS", [table for table in tables if table.columns or table.time], remarks, attrs)
+
+
+def _refuse_many_scales(known: Mapping[str, Any]) -> None:
+    """Raise DatasetError where properties promise more scales, or coefficients of one, than any program writes."""
+    numbers = [int(found[1]) + 1 for key in known if (found := _SCALE_NUMBER.match(key))]
+    promised = {_SCALES: known[_SCALES]} if _SCALES in known else {"scales": max(numbers, default=0)}
+    promised |= {key: known[key] for key in known if _COEFFICIENTS.fullmatch(key)}
+    for key, value in promised.items():
+        try:
+            count = int(value)
+        except (TypeError, ValueError, OverflowError):
+            continue  # npTDMS refuses it
+        if count > _MOST_SCALES:
+            raise DatasetError(
+                f"{key[:60]}: expected at most {_MOST_SCALES}, got {str(value)[:40]}. It is damaged."
+            )
 
 
 def _without_copies(groups: list[Any]) -> tuple[list[Any], list[str]]:

@@ -161,6 +161,8 @@ def _add(tables: list[Table], column: Column, instants: Column) -> None:
 
 def _why_not(found: Mapping[str, Any]) -> str:
     """Return what a function is that is none over time; empty for one that is."""
+    if found.get("data") is None:  # the reader knows no samples of this type, or the file ends before them
+        return "a function without samples"
     kind = int(found.get("func_type", 0))
     if kind not in _OVER_TIME or found.get("abscissa_spec_data_type") not in (0, 1, _TIME):
         return KINDS.get(kind, f"a function of type {kind}") + (

@@ -12,7 +12,6 @@ from typing import Self
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
-from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.zip_members import (
     DAMAGE,
     checked_members,
@@ -22,13 +21,11 @@ from vibroimpact.fmus.packaging.zip_members import (
     place_of,
     zip_in,
 )
-from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.fmus.safe_xml import refuse_large, root_of
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.names import SSD_FILE
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
 
-LARGEST_XML = 1 << 24
-"""Bytes of an XML file; that of a system of thousands of connections is below a million."""
 _BLOCK = 1 << 20
 _INSIDE = "Pack the file into its resources folder."
 _DRIVE = re.compile(r"[A-Za-z]:")
@@ -73,10 +70,7 @@ class SspArchive:
             It is too large, damaged, not well-formed, or declares entities.
         """
         info = self._members[member]
-        if info.file_size > LARGEST_XML:
-            raise ComponentFileError(
-                f"{self.path}: {member}: expected XML of at most {LARGEST_XML} bytes, got {info.file_size}."
-            )
+        refuse_large(info.file_size, f"{self.path}: {member}")
         return root_of(self._content(info), f"{self.path}: {member}", namespaces=True)
 
     def member(self, uri: str, where: str) -> str:

@@ -9,11 +9,11 @@ from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.zip_members import opened
-from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.fmus.safe_xml import LARGEST_XML, root_of
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.general.scene import gain_place
-from vibroimpact.orchestrator.ssp.archive import LARGEST_XML, SspArchive
+from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path
 from vibroimpact.orchestrator.ssp.scene_tables import names_of
 from vibroimpact.orchestrator.ssp.values import Parameter, read_parameter_set

@@ -14,6 +14,7 @@ from vibroimpact.fmus.packaging import archive, zip_members
 from vibroimpact.fmus.packaging.archive import binary_path, platforms, unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.safe_xml import LARGEST_XML
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{t}">
@@ -423,3 +424,20 @@ def test_what_a_killed_process_left_is_swept(
     monkeypatch.setattr(archive, "ABANDONED_AFTER", -1.0)
     fmu = unpack(written(tmp_path / "M.fmu"))
     assert unpacked_folders(cache) == [fmu.sha256]
+
+
+@pytest.mark.parametrize("name", archive.PARSED_XML)
+def test_a_description_above_16_mib_is_refused_before_a_parser_sees_it(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """A comment of 300 MB in an archive of 300 kB took minutes: expat 2.5 is quadratic in a long token."""
+    monkeypatch.setattr(archive, "root_of", None)
+    content = DESCRIPTION.encode() + b"<!--" + b"a" * LARGEST_XML + b"-->"
+    path = tmp_path / "M.fmu"
+    if name == "modelDescription.xml":
+        written(path, description=content)
+    else:
+        written(path, {BINARY: b"code", name: content})
+    assert path.stat().st_size < 100_000
+    assert f"{path}: {name}: expected XML of at most 16777216 bytes, got {len(content)}." in refusal(path)
+    assert unpacked_folders(cache) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -142,3 +143,55 @@ def test_groups_that_began_at_the_same_instant_have_one_trigger(tmp_path: Path, 
     triggers = {one.axis.trigger for one in recording.channels.values()}
     assert len(triggers) == (2 if late else 1)
     assert ("triggers: the lag" in "\n".join(recording.remarks)) == bool(late)
+
+
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [
+        (
+            {"NI_Number_Of_Scales": np.uint32(2**31)},
+            "NI_Number_Of_Scales: expected at most 100, got 2147483648",
+        ),
+        ({"NI_Number_Of_Scales": "9" * 30}, "NI_Number_Of_Scales: expected at most 100, got 9999"),
+        ({"NI_Scale[1999999999]_Scale_Type": "Linear"}, "scales: expected at most 100, got 2000000000"),
+        (
+            {
+                "NI_Scale[0]_Scale_Type": "Polynomial",
+                "NI_Scale[0]_Polynomial_Coefficients_Size": np.int32(101),
+            },
+            "Coefficients_Size: expected at most 100, got 101",
+        ),
+    ],
+)
+@pytest.mark.parametrize("place", ["channel", "group", "file"])
+def test_more_scales_than_a_program_writes_are_refused_before_the_data(
+    tmp_path: Path, known: dict[str, Any], said: str, place: str
+) -> None:
+    """The number is the length of a loop in npTDMS: a file of 243 bytes took half an hour, one of 6 kB 4.8 GB."""
+    own = known if place == "channel" else {}
+    objects = [
+        RootObject(known if place == "file" else {}),
+        GroupObject("run", known if place == "group" else {}),
+        channel("base", np.arange(9.0), **own),
+    ]
+    path = tmp_path / "record.tdms"
+    with TdmsWriter(path) as writer:
+        writer.write_segment(objects)
+    with pytest.raises(DatasetError, match=re.escape(said)) as refused:
+        import_recording([path])
+    assert str(refused.value).startswith(f"{path}: ")
+
+
+def test_a_hundred_scales_and_a_long_table_are_read(tmp_path: Path) -> None:
+    scale: dict[str, Any] = {
+        "NI_Number_Of_Scales": np.uint32(1),
+        "NI_Scale[0]_Scale_Type": "Table",
+        "NI_Scale[0]_Table_Pre_Scaled_Values_Size": 150,
+        "NI_Scale[0]_Table_Scaled_Values_Size": 150,
+        "NI_Scale[0]_Table_Input_Source": np.uint32(0xFFFFFFFF),
+    }
+    for place in range(150):
+        scale[f"NI_Scale[0]_Table_Pre_Scaled_Values[{place}]"] = float(place)
+        scale[f"NI_Scale[0]_Table_Scaled_Values[{place}]"] = 2.0 * place
+    base = import_recording([written(tmp_path, [channel("base", np.arange(9.0), **scale)])]).channels["base"]
+    np.testing.assert_allclose(base.values, 2.0 * np.arange(9.0))

@@ -144,3 +144,33 @@ def test_a_package_that_is_missing_is_named_with_how_to_get_it(
     told = str(refused.value)
     assert "pip install 'vibroimpact[uff]'" in told
     assert "pip install '.[uff]'" in told
+
+
+def test_a_function_that_ends_before_its_samples_is_refused_by_name(tmp_path: Path) -> None:
+    """pyuff then has no samples at all, which was a KeyError here."""
+    path = tmp_path / "record.uff"
+    axes = (
+        "        17    0    0    0 Time                 s\n"
+        + "        12    0    0    0 a                    m\n"
+    ) + ("         0    0    0    0 NONE                 NONE\n" * 2)
+    path.write_text(
+        "    -1\n    58b     1     2          11        16     0     0           0           0\n"
+        + f"{'':80}\n" * 5
+        + "    1         0    0         0 base               1   3 NONE               0   0\n"
+        + "         9         2         1  0.00000e+00  1.00000e-02  0.00000e+00\n"
+        + axes
+        + "  0.00000e+00  0.00000e+00\n    -1\n"
+    )
+    with pytest.raises(DatasetError, match="a function without samples") as refused:
+        import_recording([path])
+    assert str(refused.value).startswith(f"{path}: expected a universal file (UFF) with functions over time")
+
+
+@pytest.mark.parametrize("lines", range(3, 14))
+def test_a_universal_file_cut_after_any_line_of_its_head_is_refused(tmp_path: Path, lines: int) -> None:
+    path = written(tmp_path, function("base"))
+    head = path.read_text().splitlines(keepends=True)[:lines]
+    for end in ("", "    -1\n"):
+        path.write_text("".join(head) + end)
+        with pytest.raises(DatasetError, match=r"record\.uff: expected"):
+            import_recording([path])
