@@ -60,7 +60,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
     """
     problems = list(problems_of(recording))
     if problems:
-        raise DatasetError("\n".join(f"recording: {problem}" for problem in problems))
+        raise DatasetError("\n".join(f"{recording.title}: {problem}" for problem in problems))
     with netcdf_lock():
         file = netCDF4.Dataset("recording.nc", "w", format="NETCDF4", memory=1)
         file.setncatts(

@@ -111,8 +111,10 @@ def test_what_contradicts_the_schema_is_refused_and_no_file_is_left(
     parts |= change
     axis = TimeAxis(np.asarray(parts["time"]), parts.get("interval"), parts.get("doubt", 0.0))  # type: ignore[arg-type]
     channel = Channel(str(parts["name"]), np.asarray(parts["values"]), "V", axis, np.zeros(3, np.uint8))
-    with pytest.raises(DatasetError, match=told):
-        write_recording(Recording({channel.name: channel}), tmp_path / "r.nc")
+    recording = Recording({channel.name: channel}, attrs={"source_file": "tip.lvm"})
+    with pytest.raises(DatasetError, match=told) as refused:
+        write_recording(recording, tmp_path / "r.nc")
+    assert str(refused.value).startswith("tip.lvm: "), "the file that was read"
     assert list(tmp_path.iterdir()) == []
 
 
