@@ -79,9 +79,9 @@ def split_label(text: str) -> tuple[str, str]:
         if match is not None:
             return match["name"].strip(), match["unit"].strip()
     match = _AFTER_IN.fullmatch(label)
-    if match is not None and match["unit"] not in _NO_UNITS_IN_WORDS and is_known_unit(match["unit"]):
-        return match["name"], match["unit"]
-    return label, ""
+    if match is None or match["unit"] in _NO_UNITS_IN_WORDS or match["unit"].isdigit():
+        return label, ""
+    return (match["name"], match["unit"]) if is_known_unit(match["unit"]) else (label, "")
 
 
 def is_time_unit(label: str) -> bool:

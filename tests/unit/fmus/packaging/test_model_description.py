@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from importlib.metadata import version
 
 import pytest
 from support.fmpy_checks import description_problems
@@ -251,7 +252,9 @@ def test_nothing_is_said_where_fmpy_says_nothing_and_something_where_it_does(cha
         found: tuple[object, ...] = read(content).findings
     except ComponentFileError as refusal:
         found = (refusal,)
-    assert bool(found) == bool(fmpy), (found, fmpy)
+    # an older FMPy looks at less
+    is_older = tuple(map(int, version("fmpy").split(".")[:3])) < (0, 3, 32)
+    assert bool(found) == bool(fmpy) or (found and is_older), (found, fmpy)
 
 
 def seconds_to_read(name: str) -> float:
