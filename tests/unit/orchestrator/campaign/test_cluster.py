@@ -247,3 +247,22 @@ def test_workers_that_never_start_are_one_clear_error(
     with pytest.raises(CampaignError, match="expected 3 workers that start, got a failure 5 times"):
         cluster._started_workers(3, tmp_path)
     assert len(starts) == MOST_STARTS
+
+
+def test_a_scheduler_that_says_two_things_at_once_is_connected_to_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tries = []
+
+    class Busy:
+        def __init__(self, address: str, **_: object) -> None:
+            tries.append(address)
+            assert len(tries) == 3, "as Dask's client does of its first message"
+
+    monkeypatch.setattr(cluster, "Client", Busy)
+    assert isinstance(cluster._connected("tcp://127.0.0.1:8786", Security()), Busy)
+    assert len(tries) == 3
+    tries.clear()
+    monkeypatch.setattr(cluster, "MOST_STARTS", 2)
+    with pytest.raises(AssertionError):
+        cluster._connected("tcp://127.0.0.1:8786", Security())
