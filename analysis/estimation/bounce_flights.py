@@ -159,7 +159,7 @@ def _fitted(channel: Channel, found: FittedBounces, start: float, end: float) ->
 
 
 def _shrinking(lengths: Floats, covariance: Floats) -> int:
-    """Return how many flights there are up to one that is longer than the one before it, beyond its error."""
+    """Return the number of flights before the first one that is longer, beyond its error, than its predecessor."""
     step = _differences(len(lengths))
     errors = np.sqrt(np.diag(step @ covariance @ step.T))
     longer = np.flatnonzero(lengths[1:] > _LONGER * lengths[:-1] + _LONGER_BEYOND * errors)

@@ -42,7 +42,7 @@ class Signal:
 
     @property
     def side(self) -> str:
-        """Where the stop is: `upper` or `lower`."""
+        """Side of the stop: `upper` or `lower`."""
         return "upper" if self.sign > 0.0 else "lower"
 
     @property

@@ -157,7 +157,7 @@ def edges(values: Any) -> Any:
 
 
 def drawable_variables(dataset: xr.Dataset) -> list[str]:
-    """Return what can be drawn over a swept parameter: numbers of runs, of their periods and of their impacts."""
+    """Return the variables that can be drawn over a swept parameter: of runs, their periods and their impacts."""
     known = (*_OF_PERIODS, *_OF_IMPACTS)
     return [name for name in known if name in dataset.variables]
 
