@@ -33,6 +33,8 @@ MODELS = {
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
 }
+#: The token of an FMU that looks at none.
+ANY_TOKEN = "*"
 MADE = tuple(
     (name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (SOURCES / f"{name}.fmi{fmi[0]}.xml").exists()
 )
@@ -81,9 +83,12 @@ def faulty(folder: Path, fmi: str = "3.0") -> Path:
     return _write("Faulty", fmi, folder)
 
 
-def gain(folder: Path) -> Path:
-    """Write y = k u + b in FMI 2.0: direct feedthrough, and no state that can be saved."""
-    return _write("Gain", "2.0", folder)
+def gain(folder: Path, token: str = "") -> Path:
+    """Write y = k u + b in FMI 2.0: direct feedthrough, and no state that can be saved.
+
+    With `ANY_TOKEN` it makes an instance for every token, as FMUs of Hopsan and Amesim do.
+    """
+    return _write("Gain", "2.0", folder, token)
 
 
 def mass(folder: Path, fmi: str = "3.0", *, states: bool = True) -> Path:
@@ -110,13 +115,14 @@ def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> P
     return target
 
 
-def _write(name: str, fmi: str, folder: Path) -> Path:
+def _write(name: str, fmi: str, folder: Path, token: str = "") -> Path:
     version = f"fmi{fmi[0]}"
     path = folder / f"{name}.{version}.fmu"
     description = (SOURCES / f"{name}.{version}.xml").read_text(encoding="utf-8")
+    token = token or _token(name, fmi)
     members = {
-        "modelDescription.xml": description.replace("{token}", _token(name, fmi)).encode(),
-        f"binaries/{binary_folder(fmi)}/{name}{library_suffix()}": _binary(name, fmi),
+        "modelDescription.xml": description.replace("{token}", token).encode(),
+        f"binaries/{binary_folder(fmi)}/{name}{library_suffix()}": _binary(name, fmi, token),
     }
     write_fmu(path, members)
     return path
@@ -127,20 +133,20 @@ def _token(name: str, fmi: str) -> str:
 
 
 @cache
-def _binary(name: str, fmi: str) -> bytes:
+def _binary(name: str, fmi: str, token: str) -> bytes:
     adapter, suffix = SOURCES / f"fmi{fmi[0]}.c", library_suffix()
     headers = [*SOURCES.glob("*.h"), *fmi_headers().glob("*.h")]
     key = digest(
-        *(compiler_identity(find_compiler()), *LANGUAGE, *WARNINGS, _token(name, fmi)),
+        *(compiler_identity(find_compiler()), *LANGUAGE, *WARNINGS, token),
         content_of([Path(__file__), adapter, SOURCES / MODELS[name], *headers]),
     )
-    return kept(f"{name}.fmi{fmi[0]}{suffix}", key, partial(_compile, name, fmi, adapter)).read_bytes()
+    return kept(f"{name}.fmi{fmi[0]}{suffix}", key, partial(_compile, name, fmi, adapter, token)).read_bytes()
 
 
-def _compile(name: str, fmi: str, adapter: Path, library: Path) -> None:
+def _compile(name: str, fmi: str, adapter: Path, token: str, library: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         generated = Path(folder)
-        (generated / "token.h").write_text(f'#define TOKEN "{_token(name, fmi)}"\n', encoding="ascii")
+        (generated / "token.h").write_text(f'#define TOKEN "{token}"\n', encoding="ascii")
         rest = generated / "rest.c"
         rest.write_text(_functions_left_out([adapter, SOURCES / MODELS[name]], fmi), encoding="ascii")
         # not strict: the headers' own empty parameter lists are a warning for some compilers

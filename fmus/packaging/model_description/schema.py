@@ -30,8 +30,8 @@ DISPENSABLE = {
 }
 #: Children of the root that are read wherever they stand.
 _ANYWHERE = {
-    *("UnitDefinitions", "TypeDefinitions", "LogCategories", "DefaultExperiment", "VendorAnnotations"),
-    *("ModelExchange", "CoSimulation", "ScheduledExecution", "Annotations"),
+    *("UnitDefinitions", "TypeDefinitions", "LogCategories", "DefaultExperiment"),
+    *("ModelExchange", "CoSimulation", "ScheduledExecution"),
 }
 #: Rounds of the schema, in each of which elements may be left out; errors that are graded one by one.
 _MOST_ROUNDS, _MOST_ERRORS = 20, 1000
@@ -55,6 +55,7 @@ def amend_by_schema(root: Any, version: str, schemas: Path, findings: Findings) 
         Grows.
     """
     folder = schemas / f"fmi{version[0]}"
+    _drop_annotations(root)
     _drop_unknown_attributes(root, version, folder, findings)
     _Amendments(root, folder, findings).make()
 
@@ -82,26 +83,23 @@ def _names(folder: Path, kind: str) -> frozenset[str]:
     return frozenset(e.get("name", "") for file in files for e in file.iter(f"{_XSD}{kind}"))
 
 
+def _drop_annotations(root: Any) -> None:
+    """Leave out what is a tool's own: FMI's schema takes one element of it, and tools write several."""
+    for element in list(root.iter(*_FREE)):
+        if element.getparent() is not None:
+            element.getparent().remove(element)
+
+
 def _drop_unknown_attributes(root: Any, version: str, folder: Path, findings: Findings) -> None:
     """Leave out attributes of no name of the schema, which lets some pass whatever their spelling."""
     known = _names(folder, "attribute")
-    for element in _described(root):
+    for element in root.iter(etree.Element):
         for name in [name for name in element.attrib if name not in known and not name.startswith(_XSI)]:
             del element.attrib[name]
             near = [] if name.startswith("{") else difflib.get_close_matches(name[:_LONGEST], known, n=1)
             hint = f" Did you mean {near[0]}?" if near else ""
             got = f"{element.tag}: expected an attribute of FMI {version}'s schema, got {_cut(name)}.{hint}"
             findings.add(Grade.doubt if near else Grade.remark, got)
-
-
-def _described(root: Any) -> list[Any]:
-    """Return the elements outside what is a tool's own."""
-    found, waiting = [], [root]
-    while waiting:
-        element = waiting.pop()
-        found.append(element)
-        waiting += [child for child in reversed(element) if child.tag not in _FREE]
-    return found
 
 
 def _cut(text: str) -> str:

@@ -6,7 +6,7 @@
 
 #include "fmi2Functions.h"
 #include "model.h"
-#include "token.h"
+#include "wrong_token.h"
 
 /* Largest distance of a communication point from the FMU's own time, as a part of 1 + |time|. */
 #define TIME_TOLERANCE 1e-9
@@ -75,7 +75,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     (void)resources, (void)visible, (void)logging;
-    if (type != fmi2CoSimulation || strcmp(guid, TOKEN) != 0 || callbacks->allocateMemory == NULL) {
+    if (type != fmi2CoSimulation || is_wrong(guid) || callbacks->allocateMemory == NULL) {
         return NULL;
     }
     instance2 *i = callbacks->allocateMemory(1, sizeof *i); /* not by functions of its own */

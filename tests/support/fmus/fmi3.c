@@ -7,7 +7,7 @@
 
 #include "fmi3Functions.h"
 #include "model.h"
-#include "token.h"
+#include "wrong_token.h"
 
 /* Largest distance of a communication point from the FMU's own time, as a part of 1 + |time|. */
 #define TIME_TOLERANCE 1e-9
@@ -77,7 +77,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 {
     (void)name, (void)resources, (void)visible, (void)logging, (void)intermediate;
     const bool wants_intermediate_updates = update != NULL || intermediate_count > 0;
-    if (strcmp(token, TOKEN) != 0 || wants_intermediate_updates || (event_mode_used && !model_has_event_mode)) {
+    if (is_wrong(token) || wants_intermediate_updates || (event_mode_used && !model_has_event_mode)) {
         return NULL;
     }
     instance3 *i = calloc(1, sizeof *i);

@@ -54,12 +54,20 @@ def test_a_description_without_a_fault_is_read_as_it_is(name: str, fmi: str) -> 
 
 def test_dymolas_namespaces_and_annotations_are_no_findings() -> None:
     namespaces = 'xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="x.xsd"'
-    tool = '<VendorAnnotations><Tool name="Dymola"><GraphicsGroup coordinateSystem="1"/></Tool></VendorAnnotations>'
-    found = gain2((ROOT, f"{ROOT} {namespaces}"), ("  <DefaultExperiment", f"  {tool}<DefaultExperiment"))
-    # the schema wants annotations after the experiment; Dymola writes them there
-    assert [one.grade for one in found.findings] in ([], [Grade.remark])
-    ordered = gain2((ROOT, f"{ROOT} {namespaces}"), ("  <ModelVariables>", f"  {tool}<ModelVariables>"))
-    assert ordered.findings == ()
+    own = '<GraphicsGroup coordinateSystem="1"/><ScalarVariable name="x"/>text<Tool/>'
+    tool = f'<VendorAnnotations><Tool name="Dymola">{own}</Tool></VendorAnnotations>'
+    for before in ("  <DefaultExperiment", "  <ModelVariables>"):  # Dymola writes them before the experiment
+        found = gain2((ROOT, f"{ROOT} {namespaces}"), (before, f"  {tool}{before}"))
+        assert found.findings == ()
+
+
+def test_annotations_of_variables_are_a_tools_own() -> None:
+    own = '<Annotations><Annotation type="t"><a/><b c="1"/></Annotation></Annotations>'
+    start = '<Float64 name="gain" valueReference="1"'
+    found = gain3(
+        (start, f'<Float64 name="other" valueReference="99" causality="local">{own}</Float64>{start}')
+    )
+    assert [one.text for one in found.findings] == []
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
