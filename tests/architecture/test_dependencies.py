@@ -1,5 +1,6 @@
-"""What pyproject.toml asks for has two bounds, and no version with a hole that is known."""
+"""What pyproject.toml asks for has two bounds, a reason beside them, and no version with a hole that is known."""
 
+import re
 import tomllib
 from collections.abc import Iterator
 
@@ -11,6 +12,10 @@ from support.places import ROOT
 OWN = "vibroimpact"
 LAST_WITH_A_HOLE = {"starlette": "0.49.0", "h11": "0.15.0", "fastapi": "0.120.0", "cryptography": "44.0.0"}
 """The last version with a known hole, or that keeps another package at such a version."""
+
+
+OF_DEVELOPERS = ("bench", "peers", "lint", "docs", "dev", "audit")
+"""Extras that nobody installs who uses the package; one reason stands above all of them."""
 
 
 def requirements() -> Iterator[Requirement]:
@@ -42,3 +47,21 @@ def test_no_version_with_a_known_hole_is_let_in(name: str) -> None:
     found = [one for one in requirements() if one.name == name]
     assert found
     assert not any(one.specifier.contains(LAST_WITH_A_HOLE[name]) for one in found)
+
+
+def lines_with_bounds() -> Iterator[str]:
+    """Yield the lines of pyproject.toml that bound what users and tests install."""
+    text = (ROOT / "pyproject.toml").read_text()
+    _, _, project = text.partition("\ndependencies = [")
+    extra = ""
+    for line in project.partition("\n[project.scripts]")[0].splitlines():
+        key = re.match(r"([\w-]+) = \[", line)
+        extra = key[1] if key else extra
+        if '"' in line and extra not in OF_DEVELOPERS and f'"{OWN}[' not in line:
+            yield line.strip()
+
+
+@pytest.mark.parametrize("line", [*lines_with_bounds()])
+def test_the_reason_of_a_bound_stands_beside_it(line: str) -> None:
+    _, _, reason = line.rpartition('"')
+    assert "# " in reason
