@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.orbits.follow import (
     FollowedLoci,
     follow_branches,
     follow_loci,
+    orbits_not_followed,
 )
 from vibroimpact.orchestrator.ssp import opened_scene
 
@@ -93,6 +94,9 @@ def show_branches(
     if not followed.branches:
         raise OrbitError("follow: interrupted before there was an orbit.")
     _print(followed)
+    if begun.seed is None and begun.impacts is None and not (interrupted or failure):
+        for line in orbits_not_followed(followed, *wanted.span):
+            say(line)
     _print_loci(loci)
     _write(loci if loci.loci else followed, output, figure)
     if loci.loci and output is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -282,16 +282,56 @@ def follow_branches(
 
 def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought: tuple[int, int]) -> str:
     """Return what to do where there is no orbit of some impacts and periods: what runs in the range end on says it."""
-    runs = [_orbit_of_run_at(scene, parameter, value) for value in seed_values(settings)]
-    ends = Counter((orbit.phases.size, orbit.periods) for orbit in runs if orbit is not None)
+    ends = _counted(orbit for _, orbit in _ends_of_runs(scene, parameter, settings))
     ends.pop(sought, None)
     if not ends:
         return "Try another range, or other impacts and periods: no run at these values ends on an orbit."
     (impacts, periods), count = ends.most_common(1)[0]
-    asked = typed_or_called(
+    return f"Try {_asking(impacts, periods)}: runs at {count} of these values end on P({impacts},{periods})."
+
+
+def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[str]:
+    """Return a line for each kind of orbit that runs in a range end on and no branch holds, the commonest first.
+
+    Parameters
+    ----------
+    followed : Followed
+        Branches that begin at orbits of one impact.
+    start, stop : float
+        Range of the parameter.
+    """
+    settings = FollowSettings(min(start, stop), max(start, stop))
+    ends = _ends_of_runs(followed.scene, followed.parameter, settings)
+    missed = _counted(
+        orbit for value, orbit in ends if not _is_known(followed.branches, orbit, value, settings)
+    )
+    return [
+        f"Runs at {count} of {SEEDS} values of the range end on P({impacts},{periods}), which is not followed here: "
+        f"{_asking(impacts, periods)}."
+        for (impacts, periods), count in missed.most_common()
+    ]
+
+
+def _ends_of_runs(
+    scene: Scene, parameter: str, settings: FollowSettings
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    """Yield the orbits that runs end on, with their values of the parameter."""
+    for value in seed_values(settings):
+        orbit = _orbit_of_run_at(scene, parameter, value)
+        if orbit is not None:
+            yield value, orbit
+
+
+def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
+    """Return how many orbits of each number of impacts and periods there are."""
+    return Counter((orbit.phases.size, orbit.periods) for orbit in orbits)
+
+
+def _asking(impacts: int, periods: int) -> str:
+    """Return what asks for orbits of some impacts and periods."""
+    return typed_or_called(
         f"--impacts {impacts} --periods {periods}", f"impacts={impacts}, periods={periods}"
     )
-    return f"Try {asked}: runs at {count} of these values end on P({impacts},{periods})."
 
 
 def _orbit_of_run_at(scene: Scene, parameter: str, value: float) -> PeriodicOrbit | None:

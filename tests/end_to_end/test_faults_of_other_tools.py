@@ -32,7 +32,10 @@ ANNOTATIONS = (
 UNKNOWNS = """<InitialUnknowns>
       <Unknown index="2" dependencies="1 3 4"/>
     </InitialUnknowns>"""
-ENUMERATION = '<ScalarVariable name="mode" valueReference="9" causality="local"><Enumeration declaredType="E"/></ScalarVariable>'
+ENUMERATION = (
+    '<ScalarVariable name="mode" valueReference="9" causality="local"><Enumeration declaredType="E"/>'
+    "</ScalarVariable>"
+)
 TYPES = (
     '<TypeDefinitions><SimpleType name="E"><Enumeration><Item name="a" value="1"/></Enumeration></SimpleType>'
     "</TypeDefinitions>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -516,6 +517,33 @@ def test_without_an_orbit_of_one_impact_the_number_of_impacts_is_named() -> None
         match=r"got none\. Try impacts=2, periods=1: runs at \d+ of these values end on P\(2,1\)\.",
     ):
         vi.follow(scene, PARAMETER, 1.0, 2.0)
+
+
+def test_what_runs_end_on_and_no_branch_holds_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "two_stops.toml"
+    file.write_text(vi.Scene.from_dict(swept_scene()).to_toml(), encoding="utf-8")
+    command = [
+        "follow",
+        str(file),
+        "--parameter",
+        PARAMETER,
+        "--from",
+        "0.9",
+        "--to",
+        "1.3",
+        "--step",
+        "0.05",
+    ]
+    code, out, err = in_this_process(command)
+    assert code == 0, err
+    said = [line for line in out.splitlines() if "not followed here" in line]
+    assert re.fullmatch(
+        r"Runs at \d+ of 25 values of the range end on P\(2,1\), which is not followed here: "
+        r"--impacts 2 --periods 1\.",
+        said[0],
+    )
+    _, out, _ = in_this_process([*command, "--impacts", "1"])
+    assert "not followed here" not in out  # it was asked for these alone
 
 
 @pytest.mark.parametrize("variable", ["displacement_max", "strobe_displacement", "impact_phase"])

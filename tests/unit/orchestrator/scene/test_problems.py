@@ -230,6 +230,14 @@ def test_a_file_of_another_kind_is_told_by_what_it_is(tmp_path: Path, content: b
     assert load_problem(path).startswith(f"expected a scene file (TOML), got {kind}")
 
 
+def test_a_system_that_is_read_as_a_scene_says_how_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "rig.SSP"
+    path.write_bytes(b"PK\x03\x04")
+    assert load_problem(path) == (
+        "expected a scene file (TOML), got a system (SSP). `vibroimpact.import_ssp` makes a scene of it."
+    )
+
+
 def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "huge.toml"
     with path.open("wb") as file:
