@@ -38,17 +38,22 @@ from vibroimpact.orchestrator.campaign.extension import (
     scene_of_manifest,
 )
 from vibroimpact.orchestrator.campaign.manifest import (
+    DamagedManifestError,
     Manifest,
     add_build,
+    carried_manifest,
     differences,
     flat_scene,
+    read_content,
     read_manifest,
     refuse_other_runner,
     refuse_other_scene,
     runner_differences,
     scene_hash,
+    write_content,
     write_manifest,
 )
+from vibroimpact.orchestrator.campaign.manifest_copies import manifest_again
 from vibroimpact.orchestrator.campaign.other_build import compare_with_stored
 from vibroimpact.orchestrator.campaign.parts import (
     NO_RUNS,
@@ -153,9 +158,9 @@ def run_campaign(
     home = Path(folder).absolute()
     make_folder(home)
     with locked_folder(home):
-        campaign = _Campaign(scene, home, runner, progress or Progress())
         opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
         try:
+            campaign = _Campaign(scene, home, runner, progress or Progress())
             return campaign.finished_before() or campaign.run(opened)
         except OSError as error:
             # Of this process or of a worker: the folder for temporary files may be full too.
@@ -199,7 +204,15 @@ class _Campaign:
         return begun if either and begun in ("fused", "lanes") else ""
 
     def _checked_manifest(self) -> Manifest | None:
-        manifest = read_manifest(self._manifest_path)
+        """Return the manifest of the folder, made again from its copies where it is lost; None of a new campaign."""
+        damage: DamagedManifestError | None = None
+        try:
+            manifest = read_manifest(self._manifest_path)
+        except DamagedManifestError as error:
+            manifest, damage = None, error
+        manifest = manifest or self._manifest_again("damaged" if damage else "missing")
+        if manifest is None and damage is not None:
+            raise damage
         has_parts = self._parts_folder.is_dir() and own_files(self._parts_folder)
         if manifest is None and ((self._home / "dataset.nc").exists() or has_parts):
             raise UsageError(
@@ -207,6 +220,16 @@ class _Campaign:
                 f"campaign.json. Choose another folder{typed_or_called(' with -o')}."
             )
         return manifest
+
+    def _manifest_again(self, state: str) -> Manifest | None:
+        """Return the manifest made again from its copies in the folder; None where there are none."""
+        made = manifest_again(self._home, self._scene)
+        if made is None:
+            return None
+        content, origin = made
+        write_content(self._manifest_path, content)
+        self._progress.note(f"{self._manifest_path} was {state} and is made again from {origin}.")
+        return read_manifest(self._manifest_path)
 
     def _go_on_with_this_sweep(self) -> None:
         """Keep what an earlier sweep of the same scene has computed of this one."""
@@ -338,7 +361,8 @@ class _Campaign:
                     refuse_blind_workers(pool, self._home)
                 work = replace(self._work, identity=_common_identity(pool, self._work))
                 self._agree_with_manifest(pool, work, stored)
-                self._compute_with(pool, work, stages)
+                carried = carried_manifest(read_content(self._manifest_path), work.scene.source)
+                self._compute_with(pool, replace(work, manifest=carried), stages)
         finally:
             # A worker that was stopped may have been writing.
             remove_temporary_files(self._parts_folder)

@@ -37,6 +37,8 @@ DEFAULT_RUNNER = "vibroimpact.orchestrator.guard.guarded:make_runner"
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
 """Attributes of a part: the state that the next run of its branch starts from; two numbers, or an array."""
+MANIFEST = "campaign_manifest"
+"""Attribute of a part: what its campaign was started with, as `manifest.carried_manifest` returns it."""
 
 CARRYING = (Outcome.ok, Outcome.stuck)
 """Outcomes whose final state is handed on along a branch: the run came to its end, at forcing phase 0."""
@@ -67,6 +69,8 @@ class Work:
         File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
     branches : tuple of Branch
         The points of a round of an adaptive sweep; empty: those of the scene's sweep.
+    manifest : str
+        Written into each part, from which `campaign.json` is made again; empty: nothing is written.
     """
 
     scene: Scene
@@ -77,6 +81,7 @@ class Work:
     execution: str = ""
     kept: str = ""
     branches: tuple[Branch, ...] = ()
+    manifest: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -453,6 +458,8 @@ def write_part(
 ) -> dict[str, int]:
     """Write the part of a chunk, as a whole or not at all; returns how many runs ended in each way."""
     attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
+    if work.manifest:
+        attrs[MANIFEST] = work.manifest
     if carried is not None:
         attrs |= carried_attributes(carried)
     path = Path(work.parts_folder, chunk.part_name)

@@ -30,13 +30,15 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State, empty_part
+from vibroimpact.orchestrator.campaign.chunks import CARRYING, MANIFEST, Chunk, State, empty_part
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
+    carried_manifest,
     differences,
     flat_scene,
+    new_manifest,
     scene_hash,
-    write_manifest,
+    write_content,
 )
 from vibroimpact.orchestrator.campaign.parts import NO_RUNS, Note, StoredPart, list_parts, own_files
 from vibroimpact.orchestrator.run.dataset import coordinate_names, stored_samples, with_constants_of
@@ -354,7 +356,8 @@ class EarlierSweep:
 
         The folder belongs to the old sweep until the new manifest is there, and nothing is removed before.
         """
-        rows = self._rows()
+        rows, begun, hashed = self._rows(), self.manifest, scene_hash(new)
+        manifest = new_manifest(new, begun.identity, runs, begun.continued_with)
         if rows is not None:
             kept = kept_rows(self.scene, new, rows)
             count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]
@@ -362,14 +365,13 @@ class EarlierSweep:
                 return False
             if left:
                 self._store(rows, left)
-            hashed = scene_hash(new)
-            write_dataset(kept.assign_attrs(scene_hash=hashed), kept_path(self._folder, hashed))
+            carried = {"scene_hash": hashed, MANIFEST: carried_manifest(manifest, new.source)}
+            write_dataset(kept.assign_attrs(carried), kept_path(self._folder, hashed))
             self.note(f"{count} of {runs} points are kept from the earlier sweep.")
         outdated = own_files(self._folder)
-        begun = self.manifest
-        write_manifest(self.home / "campaign.json", new, begun.identity, runs, begun.continued_with)
+        write_content(self.home / "campaign.json", manifest)
         for path in outdated:
-            if path != kept_path(self._folder, scene_hash(new)):
+            if path != kept_path(self._folder, hashed):
                 path.unlink(missing_ok=True)
         return True
 
@@ -389,6 +391,7 @@ class EarlierSweep:
         """Keep the points that the new sweep does not have where they can be opened."""
         path = self.home / f"earlier-{self.manifest.scene_hash[:8]}.nc"
         attributed = rows.assign_attrs(self.manifest.attributes(self.scene))
+        attributed.attrs.pop(MANIFEST, None)
         write_dataset(with_constants_of(attributed, self.scene), path)
         self.note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
 

@@ -2,19 +2,24 @@
 
 A resumed campaign is bit-identical to an uninterrupted one. That holds only for the same scene, the same
 components, the same way of running and the same instruction set; anything else is refused here.
+
+Each part carries the manifest too, in one attribute of a few kB (`carried_manifest`): `manifest_copies` makes
+`campaign.json` again from it. Long values are left out: the text of the scene has them, and a SHA-256 shows that they
+are the same.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 from vibroimpact.analysis.files.atomic import write_atomically
-from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.provenance import git_commit, provenance, versions
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
@@ -25,8 +30,25 @@ _FORMATS = (1, FORMAT)
 """Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`."""
 NO_EFFECT = ("title",)
 """Keys that no result depends on: a campaign goes on when they change."""
+MOST_CARRIED_TEXT = 8192
+"""Characters of a scene's text above which a part carries neither text nor values: the scene has to be given again."""
+MOST_CARRIED_VALUE = 256
+"""Characters of a value, as JSON, above which a part leaves it to the text of the scene."""
+DAMAGE = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
+"""Errors that content of another shape than that of a manifest leads to."""
 _LONGEST = 60  # characters of a value in a message
 _MOST_DIFFERENCES = 5
+_LARGEST = 96 * 2**20
+"""Bytes of a manifest above which it is not read; four axes of a million values are below."""
+_MOST_OF = {b",": 4_500_000, b"[": 100_000, b"{": 100_000, b":": 1_000_000}
+"""Characters of a manifest above whose number it is not read: parsing more takes above 300 MB."""
+
+Content = dict[str, Any]
+"""What `campaign.json` holds."""
+
+
+class DamagedManifestError(UsageError):
+    """A file is in the place of a manifest and does not hold what was once written there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +143,14 @@ def holds_scene(attrs: Mapping[str, Any], scene: Scene) -> bool:
         return False
 
 
-def write_manifest(
-    path: Path,
+def new_manifest(
     scene: Scene,
     identity: RunnerIdentity,
     runs: int,
     continued_with: Sequence[Mapping[str, Any]] = (),
-) -> None:
-    """Write the manifest of a campaign that begins, whole or not at all."""
-    content = {
+) -> Content:
+    """Return the manifest of a campaign that begins."""
+    content: Content = {
         "format": FORMAT,
         "scene_hash": scene_hash(scene),
         "runs": runs,
@@ -141,12 +162,12 @@ def write_manifest(
     }
     if continued_with:
         content["continued_with"] = list(continued_with)
-    _write(path, content)
+    return content
 
 
 def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
     """Note in a manifest that a campaign goes on with other builds; `compared` points, computed again, were equal."""
-    content = json.loads(path.read_bytes())
+    content = read_content(path)
     build = {
         "fmu_hashes": dict(identity.fmu_hashes),
         "versions": versions(),
@@ -154,13 +175,29 @@ def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
         "points_compared": compared,
     }
     content["continued_with"] = [*content.get("continued_with", ()), build]
-    _write(path, content)
+    write_content(path, content)
 
 
-def _write(path: Path, content: dict[str, Any]) -> None:
-    content.pop("sha256", None)
-    content["sha256"] = _hash_of(content)
-    write_atomically(path, json.dumps(content, indent=1).encode())
+def write_manifest(
+    path: Path,
+    scene: Scene,
+    identity: RunnerIdentity,
+    runs: int,
+    continued_with: Sequence[Mapping[str, Any]] = (),
+) -> None:
+    """Write the manifest of a campaign that begins, whole or not at all."""
+    write_content(path, new_manifest(scene, identity, runs, continued_with))
+
+
+def write_content(path: Path, content: Content) -> None:
+    """Write a manifest with its SHA-256, whole or not at all."""
+    content = {key: value for key, value in content.items() if key != "sha256"}
+    write_atomically(path, json.dumps(content | {"sha256": content_hash(content)}, indent=1).encode())
+
+
+def content_hash(content: Content) -> str:
+    """Return the SHA-256 of a manifest, without the one that it has."""
+    return _hash_of({key: value for key, value in content.items() if key != "sha256"})
 
 
 def read_manifest(path: Path) -> Manifest | None:
@@ -168,26 +205,46 @@ def read_manifest(path: Path) -> Manifest | None:
 
     Raises
     ------
+    DamagedManifestError
+        When it is no file, or its content is not what was once written.
     UsageError
-        When the file is damaged or of another format.
+        When it is of another format.
     """
     try:
-        content = json.loads(path.read_bytes())
+        content = read_content(path)
         if content["format"] not in _FORMATS:
             raise UsageError(
-                f"{path}: expected format {FORMAT}, got {content['format']}. Use another folder."
+                f"{path}: expected format {FORMAT}, got {_shown(content['format'])}. Use another folder."
             )
         return _checked(content)
     except FileNotFoundError:
         return None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise UsageError(
-            f"{path}: expected the manifest of a campaign, got a damaged file ({error}). "
+    except (OSError, *DAMAGE) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise DamagedManifestError(
+            f"{path}: expected the manifest of a campaign, got a damaged file ({reason}). "
             "Put a copy of it back, or use another folder."
         ) from error
 
 
-def _checked(content: dict[str, Any]) -> Manifest:
+def read_content(path: Path) -> Content:
+    """Return the JSON of a file, read only where its size and its structure are those of a manifest."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError("it is no file")
+    if status.st_size > _LARGEST:
+        raise ValueError(f"it has {status.st_size} bytes, more than {_LARGEST}")
+    raw = path.read_bytes()
+    for character, most in _MOST_OF.items():
+        if raw.count(character) > most:
+            raise ValueError(f"it has more than {most} of the character {character.decode()!r}")
+    text = raw.decode("ascii")  # as json.dumps writes it
+    del raw
+    content: Content = json.loads(text)
+    return content
+
+
+def _checked(content: Content) -> Manifest:
     """Return what a manifest says, if it is what was once written.
 
     Raises
@@ -195,12 +252,10 @@ def _checked(content: dict[str, Any]) -> Manifest:
     ValueError, KeyError, TypeError, AttributeError
         When it is not.
     """
-    recorded = content.pop("sha256", None)
+    recorded, found = content.get("sha256"), content_hash(content)
     if recorded is None and content["format"] == 1:
-        recorded, content_hash = content["scene_hash"], _hash_of(content["scene"])
-    else:
-        content_hash = _hash_of(content)
-    if recorded != content_hash:
+        recorded, found = content["scene_hash"], _hash_of(content["scene"])
+    if recorded != found:
         raise ValueError("its content is not the one whose SHA-256 it has")
     identity = RunnerIdentity(
         content["execution"],
@@ -218,6 +273,45 @@ def _checked(content: dict[str, Any]) -> Manifest:
             {**build, "fmu_hashes": dict(build["fmu_hashes"])} for build in content.get("continued_with", ())
         ),
     )
+
+
+def carried_manifest(content: Content, source: str) -> str:
+    """Return the manifest of a campaign as its parts carry it.
+
+    Parameters
+    ----------
+    content : dict
+        Of `campaign.json`.
+    source : str
+        File beside which the files lie that the scene names.
+
+    Returns
+    -------
+    str
+        JSON; `null` stands for what the scene tells.
+    """
+    text, values = content["scene_text"], content["scene"]
+    content = {**content, "sha256": content_hash(content)}
+    shown = {key: json.dumps(value) for key, value in values.items()}
+    told: dict[str, str] = {}
+    if len(text) > MOST_CARRIED_TEXT or any(len(one) > MOST_CARRIED_VALUE for one in shown.values()):
+        told = {key: json.dumps(value) for key, value in values_of(text, source).items()}
+    if len(text) > MOST_CARRIED_TEXT and told == shown:
+        return json.dumps(content | {"scene": None, "scene_text": None})
+    short = {
+        key: None if len(shown[key]) > MOST_CARRIED_VALUE and told.get(key) == shown[key] else value
+        for key, value in values.items()
+    }
+    return json.dumps(content | {"scene": short})
+
+
+def values_of(text: str, source: str) -> dict[str, Any]:
+    """Return the values of the text of a scene, as a manifest has them; none where it cannot be read."""
+    try:
+        scene = parse_scene(text, source)
+    except VibroimpactError:
+        return {}
+    return flat_scene(scene)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:

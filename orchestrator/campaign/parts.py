@@ -31,6 +31,7 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import (
     CARRIED,
     CARRIED_STATE,
+    MANIFEST,
     Chunk,
     State,
     carried_state,
@@ -147,7 +148,7 @@ def compact(parts: Sequence[Path], target: Path, scene: Scene, attrs: Mapping[st
     """
     dataset = merge_datasets(parts)
     # Those of the first part: what they say of it is not true of all runs.
-    own = (*CARRIED, CARRIED_STATE, "scene_hash")
+    own = (*CARRIED, CARRIED_STATE, MANIFEST, "scene_hash")
     dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in own} | dict(attrs)
     dataset = with_constants_of(dataset, scene)
     write_dataset(dataset, target)

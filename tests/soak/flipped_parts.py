@@ -1,8 +1,8 @@
 """Damage to the files of a campaign: the dataset is bit for bit the undisturbed one, or one clear error says no.
 
 A campaign of a few points is damaged at a seeded place of one file: a part, the rows kept from an earlier sweep, the
-manifest or the dataset. Then the same command is given. A damaged part must be computed again; the other files may be
-refused.
+manifest or the dataset. Then the same command is given. A damaged part must be computed again, and a damaged manifest
+made again; a damaged dataset may be refused.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _gone_on(folder: Path, text: str, name: str) -> str | None:
         try:
             campaign_here(patch, text, folder, runner=RUNNER)
         except VibroimpactError as error:
-            if name.startswith("parts"):
+            if name.startswith(("parts", "campaign.json")):
                 return f"refused: {error}"
             return None if len(str(error).splitlines()) == 1 else f"more than a line: {error}"
     return _difference(read_flat(folder / "dataset.nc"), undisturbed(text))

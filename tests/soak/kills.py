@@ -26,6 +26,8 @@ MOST_COMMANDS = 6
 """Of one case: all but the last may be killed."""
 POINTS = {"independent": 120, "up-down": 60}
 MILLISECONDS = 8.0
+LOST_MANIFESTS = 0.3
+"""Share of the commands before which `campaign.json` is removed."""
 STAMPS = ("history", "date_created", "creation_date")
 
 
@@ -38,6 +40,8 @@ def check(seed: int) -> str | None:
     scratch.mkdir()
     Path("scene.toml").write_text(frequency_text(POINTS[path], path, MILLISECONDS))
     for number in range(MOST_COMMANDS):
+        if chance.random() < LOST_MANIFESTS:
+            Path("campaign", "campaign.json").unlink(missing_ok=True)
         last = number == MOST_COMMANDS - 1
         code, err = _command("scene.toml", "campaign", scratch, None if last else chance)
         if code is None:

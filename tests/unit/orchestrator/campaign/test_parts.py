@@ -146,9 +146,13 @@ def test_a_damaged_dataset_is_one_clear_error_and_computed_again_when_it_is_gone
     assert_same_rows(expected, tmp_path / "sound.nc")
 
 
-def test_a_damaged_manifest_is_one_clear_error(half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_damaged_manifest_that_no_part_carries_is_one_clear_error(
+    half: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     manifest = half / "campaign.json"
     manifest.write_text(manifest.read_text().replace("restitution = 0.7", "restitution = 0.3"))
+    for path in parts_of(half):
+        write_dataset(read_flat(path).assign_attrs(campaign_manifest=""), path)
     with pytest.raises(UsageError, match="expected the manifest of a campaign, got a damaged file"):
         campaign_here(monkeypatch, TEXT, half)
 

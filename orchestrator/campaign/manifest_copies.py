@@ -1,0 +1,219 @@
+"""`campaign.json` made again, where it is lost or damaged, from what the other files of a campaign say.
+
+Each part, and the rows kept from an earlier sweep, carry the manifest (`manifest.carried_manifest`); the dataset of a
+finished campaign has the same facts among its attributes. Files of several campaigns are refused by name.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.dataset import read_part
+from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
+from vibroimpact.orchestrator.campaign.chunks import MANIFEST
+from vibroimpact.orchestrator.campaign.manifest import (
+    DAMAGE,
+    FORMAT,
+    Content,
+    content_hash,
+    flat_scene,
+    scene_hash,
+    values_of,
+)
+from vibroimpact.orchestrator.campaign.parts import own_files
+from vibroimpact.orchestrator.run import OTHER_ENGINE
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+
+_CHANGING = ("continued_with", "sha256")
+"""Keys in which parts of one campaign differ, where other builds of the components went on with it."""
+_RUNNER = ("execution", "instruction_set", "fmu_hashes", "engine")
+"""Keys that a campaign keeps when it is extended to another sweep."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Copy:
+    """The manifest that a file of `runs` runs carries; `None` in it stands for what the scene tells."""
+
+    path: Path
+    content: Content
+    runs: int
+
+    @property
+    def scene_hash(self) -> str:
+        return str(self.content["scene_hash"])
+
+    @property
+    def begun(self) -> str:
+        """What all parts of one campaign have in common, as text."""
+        return json.dumps({key: value for key, value in self.content.items() if key not in _CHANGING})
+
+    @property
+    def runner(self) -> list[Any]:
+        engine = {"engine": OTHER_ENGINE}
+        return [(engine | self.content).get(key) for key in _RUNNER]
+
+    @property
+    def builds(self) -> list[Any]:
+        return list(self.content.get("continued_with", ()))
+
+    def is_of_campaign(self, other: _Copy, *, any_sweep: bool) -> bool:
+        """Whether two files are of one campaign, which one of them may know less builds of than the other."""
+        begun = self.runner == other.runner if any_sweep else self.begun == other.begun
+        return begun and all(was == now for was, now in zip(self.builds, other.builds, strict=False))
+
+
+@dataclass(slots=True)
+class _Folder:
+    """What the sound files in a folder of parts say: with a copy of the manifest, or with the hash of a scene alone."""
+
+    parts: list[_Copy] = field(default_factory=list)
+    kept: list[_Copy] = field(default_factory=list)
+    older: list[tuple[Path, str]] = field(default_factory=list)
+
+
+def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
+    """Return the manifest that the files of a campaign carry, and in words which files; None where none does.
+
+    Parameters
+    ----------
+    home : Path
+        The folder of the campaign.
+    scene : Scene
+        The scene that it is to go on with.
+
+    Raises
+    ------
+    UsageError
+        The files are of several campaigns, or the scene that the manifest needs is not given.
+    """
+    there = _read(home / "parts")
+    finished = _finished(home / "dataset.nc", scene)
+    chosen = _chosen(there, finished, scene_hash(scene))
+    if chosen is None:
+        return None
+    count = sum(copy.begun == chosen.begun for copy in there.parts)
+    origin = "1 part" if count == 1 else f"{count} parts" if count else chosen.path.name
+    return _completed(chosen, scene), origin
+
+
+def _read(folder: Path) -> _Folder:
+    found = _Folder()
+    for path in sorted(own_files(folder)) if folder.is_dir() else ():
+        try:
+            part = read_part(path)
+        except DatasetError:
+            continue  # resuming names and removes it
+        content = _content_in(part.attrs)
+        if content is None:
+            found.older.append((path, str(part.attrs.get("scene_hash"))))
+        else:
+            copies = found.kept if path.name.startswith("kept-") else found.parts
+            copies.append(_Copy(path, content, len(part.run_index)))
+    return found
+
+
+def _content_in(attrs: Mapping[str, Any]) -> Content | None:
+    """Return the manifest among the attributes of a part; None in a part of version 0.2 or older."""
+    try:
+        content: Content = json.loads(str(attrs[MANIFEST]))
+        shapes = {"scene": dict | None, "scene_text": str | None, "sha256": str}
+        fits = all(isinstance(content[key], shape) for key, shape in shapes.items())
+        fits &= isinstance(content.get("continued_with", []), list)
+        return content if fits and content["scene_hash"] == attrs["scene_hash"] else None
+    except DAMAGE:
+        return None
+
+
+def _finished(path: Path, scene: Scene) -> _Copy | None:
+    """Return the manifest that the dataset of a finished campaign tells; None where it is another dataset."""
+    if not path.is_file():
+        return None
+    try:
+        part = read_part(path)
+        runs = len(part.run_index)
+        return _Copy(path, _told_by(part.attrs, runs, scene), runs)
+    except (VibroimpactError, *DAMAGE):
+        return None
+
+
+def _told_by(attrs: Mapping[str, Any], runs: int, scene: Scene) -> Content:
+    text = str(attrs["scene"])
+    content: Content = {
+        "format": FORMAT,
+        "scene_hash": str(attrs["scene_hash"]),
+        "runs": runs,
+        "execution": str(attrs["execution"]),
+        "instruction_set": str(attrs["instruction_set"]),
+        "fmu_hashes": json.loads(str(attrs["fmu_hashes"])),
+        "engine": int(attrs.get("engine_version", OTHER_ENGINE)),
+        "versions": json.loads(str(attrs["versions"])),
+        "git_commit": str(attrs["git_commit"]),
+        "scene": flat_scene(parse_scene(text, scene.source)),
+        "scene_text": text,
+    }
+    if "continued_with" in attrs:
+        content["continued_with"] = json.loads(str(attrs["continued_with"]))
+    return content | {"sha256": content_hash(content)}
+
+
+def _chosen(there: _Folder, finished: _Copy | None, given: str) -> _Copy | None:
+    """Return the copy of the campaign that a folder is of; None where no file has one.
+
+    A campaign that is extended has for a moment the parts of its earlier sweep beside the rows that it keeps of them.
+    It is of the sweep of these rows where the scene of that sweep is given, else of the earlier one.
+    """
+    begins = [copy for copy in there.kept if copy.scene_hash == given]
+    kept = sorted(there.kept, key=lambda copy: -copy.runs)
+    candidates = begins or there.parts or ([finished] if finished is not None else kept)
+    if not candidates:
+        return None
+    first = candidates[0]
+    _refuse_several(first, there, extended=bool(begins))
+    same = [copy for copy in (*there.parts, *there.kept) if copy.begun == first.begun]
+    return max([first, *same], key=lambda copy: len(copy.builds))
+
+
+def _refuse_several(first: _Copy, there: _Folder, *, extended: bool) -> None:
+    """Raise UsageError unless all files in a folder of parts are of one campaign."""
+    strangers = [copy.path for copy in there.kept if not copy.is_of_campaign(first, any_sweep=True)]
+    for copy in there.parts:
+        known = copy.is_of_campaign(first, any_sweep=extended)
+        if not known or not copy.is_of_campaign(there.parts[0], any_sweep=False):
+            strangers.append(copy.path)
+    if not extended:
+        strangers += [path for path, hashed in there.older if hashed != first.scene_hash]
+    if strangers:
+        more = f" and {len(strangers) - 1} more" if len(strangers) > 1 else ""
+        raise UsageError(
+            f"{first.path.parent.parent}: expected files of one campaign, to make campaign.json again, got those of "
+            f"several: {first.path.name} is not of the campaign of {strangers[0].name}{more}. Move the files of the "
+            "other campaign away, or put a copy of campaign.json back."
+        )
+
+
+def _completed(copy: _Copy, scene: Scene) -> Content:
+    """Return a manifest with what its copy leaves to the scene.
+
+    Raises
+    ------
+    UsageError
+        The scene does not tell what the campaign was started with.
+    """
+    content = dict(copy.content)
+    if content["scene_text"] is None and scene_hash(scene) == content["scene_hash"]:
+        content |= {"scene": flat_scene(scene), "scene_text": scene.text}
+        return content | {"sha256": content_hash(content)}  # comments and title may be others
+    if content["scene"] is not None:
+        values = content["scene"].items()
+        told = values_of(content["scene_text"], scene.source) if None in content["scene"].values() else {}
+        content["scene"] = {key: told.get(key) if value is None else value for key, value in values}
+    if content["sha256"] != content_hash(content):
+        raise UsageError(
+            f"{copy.path}: expected the scene that this campaign was started with, to make campaign.json again, got "
+            "another one. Give that scene, or put a copy of campaign.json back."
+        )
+    return content
