@@ -69,11 +69,6 @@ def component_name(name: str) -> str:
     raise ComponentFileError(f"component: expected one of {', '.join(components())}, got {name!r}.{hint}")
 
 
-def is_component(name: str) -> bool:
-    """Return whether a text is the name of a component of the package, in any spelling."""
-    return letters_of(name) in map(letters_of, components())
-
-
 def letters_of(name: str) -> str:
     """Return the letters and digits of a name in lower case, which are the same in all its spellings.
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.fmus.shipped import components, is_component
+from vibroimpact.fmus.shipped import components, letters_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -105,17 +105,18 @@ def taken_scene(text: str, shelf: Shelf, recordings: Sequence[str] = ()) -> Take
 def _files(document: Mapping[str, Any], shelf: Shelf) -> tuple[dict[str, Path], list[str]]:
     """Return the files that a scene names, each found in the service, and what is wrong with the names."""
     files, problems = dict[str, Path](), list[str]()
+    package, known = frozenset(map(letters_of, components())), ", ".join(known_fmus(shelf))
+    own = frozenset(shelf.fmus.names())
     tables = document.get("component", {})
     for name, table in tables.items() if isinstance(tables, Mapping) else ():
         fmu = table.get("fmu") if isinstance(table, Mapping) else None
-        if fmu is None or (isinstance(fmu, str) and is_component(fmu)):
+        if fmu is None or (isinstance(fmu, str) and letters_of(fmu) in package):
             continue
-        file = shelf.fmus.find(fmu) if isinstance(fmu, str) else None
-        if file is not None:
-            files[fmu] = file
+        if isinstance(fmu, str) and fmu in own:
+            files[fmu] = shelf.fmus.folder / fmu
         else:
             problems.append(
-                f"{SOURCE}: component.{name}.fmu: expected one of {', '.join(known_fmus(shelf))}, got {fmu!r}. "
+                f"{SOURCE}: component.{name}.fmu: expected one of {known}, got {fmu!r}. "
                 "This service loads no FMU but those of the package and its own."
             )
     replay = document.get("replay")

@@ -6,14 +6,14 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
-from vibroimpact.fmus.shipped import is_component
+from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
 from vibroimpact.orchestrator.scene.general.component_facts import (
     ComponentFacts,
@@ -74,7 +74,8 @@ def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[st
         hint = 'Write [component.ball] and below it fmu = "ball.fmu".'
         problems.append(Problem("component", "one [component.NAME] table for each FMU", got, hint))
         return {}
-    found = {name: _read_component(name, table, folder, problems) for name, table in raw.items()}
+    shipped = _Shipped()
+    found = {name: _read_component(name, table, folder, shipped, problems) for name, table in raw.items()}
     problems += _only_instances(found)
     return found
 
@@ -92,7 +93,21 @@ def _only_instances(components: Mapping[str, DraftComponent]) -> Iterator[Proble
             yield Problem(key_path(("component", name, "fmu")), "another FMU", got)
 
 
-def _read_component(name: str, raw: object, folder: Path, problems: list[Problem]) -> DraftComponent:
+class _Shipped:
+    """The components of the package for one scene: the folder is looked into once, however many tables name them."""
+
+    def __init__(self) -> None:
+        self.names = components()
+        self._letters = frozenset(map(letters_of, self.names))
+        self.path = cache(fmu_path)
+
+    def __contains__(self, name: str) -> bool:
+        return letters_of(name) in self._letters
+
+
+def _read_component(
+    name: str, raw: object, folder: Path, package: _Shipped, problems: list[Problem]
+) -> DraftComponent:
     path = ("component", name)
     if not _NAME.fullmatch(name):
         hint = "A component is named in keys such as ball.h, where a dot ends its name."
@@ -102,7 +117,9 @@ def _read_component(name: str, raw: object, folder: Path, problems: list[Problem
         return DraftComponent(name)
     shipped = not _is_file_name(table.fmu)
     where = key_path((*path, "fmu"))
-    fmu = _shipped_fmu(table, path, problems) if shipped else _fmu_file(table, path, folder, problems)
+    fmu = (
+        _shipped_fmu(table, path, package, problems) if shipped else _fmu_file(table, path, folder, problems)
+    )
     facts = _facts(fmu, where, problems) if fmu else None
     parameters = _parameters(table.parameters, path, facts, problems) if facts else None
     return DraftComponent(name, fmu, shipped, facts, parameters, table.tolerance)
@@ -112,12 +129,14 @@ def _is_file_name(text: str) -> bool:
     return text.lower().endswith(".fmu")
 
 
-def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Problem]) -> Path | None:
+def _shipped_fmu(
+    table: ComponentTable, path: tuple[str, ...], package: _Shipped, problems: list[Problem]
+) -> Path | None:
     where = key_path((*path, "fmu"))
-    if not is_component(table.fmu):
+    if table.fmu not in package:
         expected = "a path that ends in .fmu, or the name of a shipped component"
         problems.append(
-            Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, components()))
+            Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, package.names))
         )
         return None
     if table.tolerance is not None:
@@ -128,7 +147,7 @@ def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Pr
         )
     fmi = table.fmi or "3.0"
     try:
-        return fmu_path(table.fmu, fmi)
+        return package.path(table.fmu, fmi)
     except ComponentFileError:
         hint = "Run `python -m vibroimpact.fmus.packaging.build`."
         expected = f"{table.fmu} built for FMI {fmi}"

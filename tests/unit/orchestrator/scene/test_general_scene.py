@@ -16,7 +16,7 @@ from support.component_mistakes import COUPLED
 from support.places import ROOT
 from support.scenes import problems_of
 
-from vibroimpact.fmus import fmu_path
+from vibroimpact.fmus import fmu_path, shipped
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.campaign.manifest import flat_scene, scene_hash
 from vibroimpact.orchestrator.importer import specification
@@ -425,6 +425,17 @@ def test_a_component_that_is_not_built_says_how_to_build_it(
         "component.a.fmu: expected Oscillator built for FMI 3.0, got no FMU. "
         "Run `python -m vibroimpact.fmus.packaging.build`."
     )
+
+
+def test_the_folder_of_the_package_is_looked_into_a_few_times_for_any_number_of_components(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked, folders = list[None](), shipped._folders
+    monkeypatch.setattr(shipped, "_folders", lambda: looked.append(None) or folders())
+    tables = "".join(f'[component.c{k}]\nfmu = "{"Gain" if k % 2 else "No"}"\n' for k in range(200))
+    with pytest.raises(SceneError, match=r"component\.c0\.fmu: expected a path that ends in \.fmu"):
+        parse_scene(tables + "[record]\nrecorded_time = 1.0\n", "many.toml")
+    assert len(looked) < 5
 
 
 @pytest.mark.parametrize("name", ["h.i", "1a", "", "a b", "\u00e4"])
