@@ -19,6 +19,7 @@ from vibroimpact.hardware import daqmx
 from vibroimpact.hardware.programs.pulses import PulseFinder, with_pulses
 from vibroimpact.hardware.rig.acquisition import QUEUE_BLOCKS, Acquisition, Block, Gap
 from vibroimpact.hardware.rig.journal import (
+    LAST_SAMPLE,
     SLOW_DISK,
     SYNC_SECONDS,
     Journal,
@@ -226,6 +227,10 @@ def recording_in(content: JournalContent, source: str) -> Recording:
             f"{source}: expected notes of gaps and samples as a journal has them, got others: "
             f"{error.errors()[0]['msg']}."
         ) from None
+    if not all(0 <= gap.first <= gap.end <= LAST_SAMPLE for gap in gaps) or not 0 <= watched <= LAST_SAMPLE:
+        raise DatasetError(
+            f"{source}: expected notes of samples 0 to {LAST_SAMPLE}, got others: the journal is damaged."
+        )
     remarks = [str(each["remark"]) for each in content.notes if "remark" in each]
     if "ended" not in notes:
         remarks.append(NO_END)

@@ -26,6 +26,8 @@ Flags = NDArray[np.uint8]
 _FROZEN = ConfigDict(extra="forbid", frozen=True)
 FEWEST_SAMPLES = 2
 """Of a recording."""
+MOST_FILLED, FILLED_ANYHOW = 10, 1_000_000
+"""Rows for each sample, and rows in any case, up to which lost samples are filled with NaN; above, their ends are."""
 
 
 class MeasuredInput(BaseModel):
@@ -196,7 +198,8 @@ def recording_of(
             f"{measurement.rig}: expected {FEWEST_SAMPLES} samples or more, got {count}. Nothing is written."
         )
     end = max(blocks[-1].end, *(gap.end for gap in gaps), 0)
-    filled = measurement.pulses is None and end <= measurement.most_samples
+    few = end <= min(measurement.most_samples, MOST_FILLED * count + FILLED_ANYHOW)
+    filled = measurement.pulses is None and few
     numbers = np.arange(end) if filled else rows_of(blocks, gaps)
     volts = np.full((len(measurement.inputs), len(numbers)), np.nan)
     for block in blocks:
