@@ -15,6 +15,7 @@ import uvicorn
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.packaging.unpacked_cache import hold_at_most
 from vibroimpact.fmus.terminal import say
 from vibroimpact.fmus.wording import option
 from vibroimpact.service.api import application
@@ -30,6 +31,8 @@ from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import DATABASE, LOG, Store
 from vibroimpact.service.supervisor import Supervisor
 
+FMUS_HELD = 8
+"""Unpacked FMUs that the service itself keeps from being swept: it reads their descriptions, its jobs run them."""
 BACKLOG = 128
 """Connections that wait to be taken, and are taken in one turn of the event loop."""
 LAST_SECONDS = 2
@@ -59,6 +62,7 @@ def serve(
     with locked_folder(folder, "service"):
         token = token_of(folder)
         sessions = Sessions(token)
+        hold_at_most(FMUS_HELD)
         with _bound(host, port) as listening:
             write_lines()
             store = Store(folder)

@@ -10,7 +10,6 @@ import hashlib
 import shutil
 import stat
 import tempfile
-import time
 import zipfile
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,6 +18,7 @@ from xml.etree.ElementTree import Element
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import FileState, file_state, is_settled
+from vibroimpact.fmus.packaging import unpacked_cache
 from vibroimpact.fmus.packaging.platform_names import architecture, binary_folder, library_suffix
 from vibroimpact.fmus.packaging.zip_members import (
     DAMAGE,
@@ -42,8 +42,8 @@ from vibroimpact.fmus.safe_xml import refuse_large, root_of
 
 #: Most bytes of a model identifier: with an ending it is the name of a file.
 LONGEST_IDENTIFIER = 240
-#: Age after which the temporary folder of a process that was killed is swept, s.
-ABANDONED_AFTER = 3600.0
+#: Age, s, after which a half unpacked folder that no process has locked is swept: its process was killed.
+ABANDONED_AFTER = 600.0
 INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 #: The XML files that tools parse; all must be free of entities.
 PARSED_XML = (
@@ -98,7 +98,7 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
 
     What lies there is compared with the archive byte by byte, once in a process and again where a file changed
     since: what is loaded is what `sha256` names. Safe with any number of processes at once: each unpacks into a
-    folder of its own, and the first to rename it into place wins.
+    folder of its own, and the first to rename it into place wins. While this process lives no other one sweeps it.
 
     Raises
     ------
@@ -113,6 +113,7 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
         members = checked_members(path, archive, limit)
         _refuse_large_xml(path, members)
         folder = _cache(path) / digest
+        unpacked_cache.hold(folder)
         if not _is_intact(folder, archive, members):
             _unpack_into_place(path, archive, members, folder)
     return _described(path, folder, digest)
@@ -217,8 +218,9 @@ def _unpack_into_place(
     path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path
 ) -> None:
     try:
-        _sweep(folder.parent)
-        temporary = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=folder.parent))
+        unpacked_cache.sweep(folder.parent, sum(member.file_size for member in members), ABANDONED_AFTER)
+        temporary = Path(tempfile.mkdtemp(prefix=unpacked_cache.UNPACKING, dir=folder.parent))
+        unpacked_cache.hold(temporary)
     except OSError as error:
         raise ComponentFileError(
             f"{folder.parent}: expected a folder that can be written, got: {error.strerror}. "
@@ -228,8 +230,10 @@ def _unpack_into_place(
         _extract(path, archive, members, temporary)
         _check_xml(path, temporary)
         _rename(temporary, folder, archive, members)
+        unpacked_cache.hold(folder)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+        unpacked_cache.let_go(temporary)
     if not _is_intact(folder, archive, members):
         raise ComponentFileError(
             f"{path}: expected an unpacked copy equal to the archive in {folder}, got another. Something else writes "
@@ -279,16 +283,6 @@ def _rename(temporary: Path, folder: Path, archive: zipfile.ZipFile, members: li
                 raise ComponentFileError(
                     f"{folder}: expected to replace a damaged copy, got: {error.strerror}. Delete it."
                 ) from error
-
-
-def _sweep(cache: Path) -> None:
-    for left in cache.glob(".unpacking-*"):
-        try:
-            abandoned = time.time() - left.stat().st_mtime > ABANDONED_AFTER
-        except FileNotFoundError:
-            continue
-        if abandoned:
-            shutil.rmtree(left, ignore_errors=True)
 
 
 def _description(path: Path, folder: Path) -> Element:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import shutil
 import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -21,6 +22,7 @@ MOST_RECEIVED = 16
 """Uploads whose bodies are received at a time; others wait for their turn before their bodies are read."""
 STALLED_SECONDS = 30.0
 """Silence after which an upload is given up."""
+_PREFIX = ".upload-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class Uploads:
     Parameters
     ----------
     folder : Path
-        Where they lie meanwhile; emptied.
+        Where they lie meanwhile, which is this service's alone; what a killed one left there is removed.
 
     Attributes
     ----------
@@ -48,6 +50,8 @@ class Uploads:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        for left in folder.glob(f"{_PREFIX}*"):
+            shutil.rmtree(left)
         self._receptions = asyncio.Semaphore(MOST_RECEIVED)
         self.turn = asyncio.Semaphore(imports_at_once(machine_memory()))
 
@@ -61,7 +65,7 @@ class Uploads:
             It has stalled, or was cut off.
         """
         async with self._receptions:
-            with tempfile.TemporaryDirectory(prefix=".upload-", dir=self._folder) as folder:
+            with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=self._folder) as folder:
                 file = Path(folder, name)
                 yield Upload(file, await _written(request, file))
 
