@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo fast test soak coverage exchange conformance wheel oldest sanitize bench peers lint docs clean
+.PHONY: help demo fast test soak coverage exchange conformance wheel oldest audit sanitize bench peers lint docs clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -70,6 +70,9 @@ oldest: ## run all tests on Python 3.11 with the lowest versions that pyproject.
 	@$(OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { echo "make oldest: expected Python 3.11, got $$($(OLDEST) --version 2>&1). Say where it is: make oldest PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@$(MAKE) test VENV=.venv-oldest INSTALL='$$(INSTALL_LOWEST)' PYTHON=$(OLDEST)
 
+audit: $(VENV)/audit.stamp ## ask the database of advisories about what is installed and about the lowest versions allowed; needs the network
+	$(BIN)/python tests/support/audit.py
+
 lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -124,6 +127,12 @@ $(VENV)/lint.stamp: $(SETUP) | $(BIN)/python
 	$(ANNOUNCE)
 	$(INSTALL) -e '.[lint]'
 	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
+
+# with all that an installation may have: an advisory on any of it counts
+$(VENV)/audit.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
+	$(INSTALL) -e '.[audit,test]'
+	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 $(VENV)/docs.stamp: $(SETUP) | $(BIN)/python
 	$(ANNOUNCE)

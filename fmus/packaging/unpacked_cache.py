@@ -1,9 +1,9 @@
 """The cache of unpacked FMUs is bounded in size and age; what a living process uses is never swept.
 
 A process holds a shared lock on each unpacked folder that it uses. The system releases the lock when the process dies,
-however it dies. A folder whose lock is free is swept where it was not used for long. Where the cache is too large, those
-go that were not used for the longest time. Windows cannot lock folders; a folder with a loaded library stays there,
-since it cannot be renamed.
+however it dies. A folder whose lock is free is swept where it was not used for long. Where the cache is too large, the
+longest unused go first. Windows cannot lock folders; a folder with a loaded library stays there, since it cannot be
+renamed.
 """
 
 from __future__ import annotations

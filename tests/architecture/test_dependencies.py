@@ -1,12 +1,15 @@
 """What pyproject.toml asks for has two bounds, a reason beside them, and no version with a hole that is known."""
 
+import json
 import re
+import subprocess
 import tomllib
 from collections.abc import Iterator
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.version import Version
+from support import audit
 from support.places import ROOT
 
 OWN = "vibroimpact"
@@ -65,3 +68,43 @@ def lines_with_bounds() -> Iterator[str]:
 def test_the_reason_of_a_bound_stands_beside_it(line: str) -> None:
     _, _, reason = line.rpartition('"')
     assert "# " in reason
+
+
+def test_the_lowest_versions_are_those_that_are_audited() -> None:
+    lowest = dict(line.split("==") for line in audit.lowest())
+    assert lowest["h11"] == "0.16"
+    assert lowest["nolds"] == "0.6.2"
+    here = {one.name for one in requirements() if one.marker is None or one.marker.evaluate()}
+    assert here - {"hatchling", "FMPy"} == lowest.keys() - {"hatchling", "FMPy"}
+
+
+KNOWN = {"name": "h11", "version": "0.14.0", "vulns": [{"id": "CVE-2025-43859"}]}
+SOUND = {"name": "h11", "version": "0.16.0", "vulns": []}
+UNKNOWN = {"name": "h11", "skip_reason": "Dependency not found on PyPI and could not be audited: h11 (0.16)"}
+
+
+@pytest.mark.parametrize(
+    ("dependencies", "said", "expected"),
+    [
+        ([SOUND, UNKNOWN], "", 0),
+        ([SOUND, KNOWN], "Found 1 known vulnerability in 1 package", 1),
+        ([UNKNOWN], "No known vulnerabilities found", 0),
+        (None, "requests.exceptions.ConnectionError: HTTPSConnectionPool: Max retries exceeded", 0),
+        (None, "ERROR:pip_audit._cli: no such file", 1),
+    ],
+)
+def test_a_hole_fails_and_a_database_out_of_reach_is_said_and_does_not(
+    dependencies: list[dict[str, object]] | None,
+    said: str,
+    expected: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = "" if dependencies is None else json.dumps({"dependencies": dependencies, "fixes": []})
+    answer = subprocess.CompletedProcess([], expected, stdout=out, stderr=said)
+    monkeypatch.setattr(audit.subprocess, "run", lambda *_, **__: answer)
+    assert audit.audited("the lowest versions") == expected
+    told = capsys.readouterr()
+    answered = any("vulns" in one for one in dependencies or [])
+    assert ("could not be reached" in told.err) == (not answered and not expected)
+    assert ("CVE-2025-43859" in told.out) == bool(expected and dependencies)

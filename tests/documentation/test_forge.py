@@ -29,7 +29,7 @@ def steps() -> list[dict[str, Any]]:
 def test_the_workflow_calls_targets_of_the_makefile_and_extras_that_are_there() -> None:
     commands = [step["run"] for step in steps() if "run" in step]
     made = {target for command in commands for target in re.findall(r"^make (\w+)$", command, re.MULTILINE)}
-    assert made == {"test", "oldest", "lint", "docs", "soak"}
+    assert made == {"test", "oldest", "lint", "docs", "soak", "audit"}
     assert made <= TARGETS
     for command in commands:
         for extra in re.findall(r"\.\[(\w+)\]", command):
@@ -54,6 +54,12 @@ def test_long_series_run_each_week_and_no_push_waits_for_them() -> None:
     assert workflow[True]["schedule"] == [{"cron": "17 2 * * 6"}]
     assert workflow["jobs"]["soak"]["if"] == "github.event_name == 'schedule'"
     assert {"run": "make soak", "env": {"MINUTES": 240}} in workflow["jobs"]["soak"]["steps"]
+
+
+def test_advisories_are_asked_for_each_week_for_they_come_without_a_push() -> None:
+    job = read(WORKFLOW)["jobs"]["audit"]
+    assert job["if"] == "github.event_name == 'schedule'"
+    assert {"run": "make audit"} in job["steps"]
 
 
 def test_the_workflow_may_read_only() -> None:
