@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator
 from http import HTTPStatus
+from itertools import islice
 from typing import Any
 
 import h11
@@ -19,9 +20,12 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from vibroimpact.service.child import SHORT
 from vibroimpact.service.problems import MEDIA_TYPE, problem
+from vibroimpact.service.turns import Turns
 
 MOST_CONNECTIONS = 500
-"""Open connections; one more closes the oldest of a stranger, if there is one without a whole request."""
+"""Open connections; one more closes the oldest of strangers, if there are some without a whole request."""
+SHARE_CLOSED = 1 / 16
+"""Part of the connections that is closed at a time, so that who can be spared is not looked for at each new one."""
 MOST_HEAD = 16 * 2**10
 """Size of request line and headers, byte; a longer head is refused (431)."""
 HEAD_SECONDS = 10.0
@@ -40,11 +44,14 @@ FEWEST_CONNECTIONS = 16
 """Connections that are allowed where the system allows few open files."""
 ROOM = 32
 """Connections of strangers that are closed when the system has no more open files."""
+PASSES_UNREAD = 3
+"""Passes of the event loop after which a connection that was taken is read: many are taken in one pass."""
 SAID_SECONDS = 60.0
 """Time after which a shortage that lasts is logged again, s."""
 LOG = logging.getLogger("vibroimpact.service")
 KNOWN = "vibroimpact.known"
-"""Extension of an ASGI scope: its `tell` says that the sender of the request has the token."""
+"""Extension of an ASGI scope: `tell` says that the sender of the request has the token, `turn` waits for the turn of
+one who has not."""
 
 
 def most_connections() -> int:
@@ -70,10 +77,16 @@ class Connections:
     ----------
     most : int
         Connections that may be open at a time.
+
+    Attributes
+    ----------
+    turns : Turns
+        Turns of the requests of strangers.
     """
 
     def __init__(self, most: int = MOST_CONNECTIONS) -> None:
         self._most = most
+        self.turns = Turns()
         self._open: dict[LimitedProtocol, None] = {}
         self._sweep: asyncio.TimerHandle | None = None
         self._swept, self._said = 0.0, -SAID_SECONDS
@@ -86,13 +99,16 @@ class Connections:
         """Add a connection; where it is one too many, close the oldest that can be spared, else this one."""
         self._open[connection] = None
         if len(self._open) > self._most:
-            self._close(next(self._spared(connection), connection))
+            spared = list(islice(self._spared(connection), max(1, int(SHARE_CLOSED * self._most))))
+            for one in spared or [connection]:
+                self._close(one)
         if self._sweep is None and self._open:
             self._swept = time.monotonic()
             self._sweep = asyncio.get_running_loop().call_later(SWEEP_SECONDS, self._look)
 
     def discard(self, connection: LimitedProtocol) -> None:
         """Forget a connection that is closed."""
+        self.turns.leave(connection)
         self._open.pop(connection, None)
 
     def on_loop_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -101,7 +117,7 @@ class Connections:
         if not (isinstance(error, OSError) and error.errno in SHORT):
             loop.default_exception_handler(context)
             return
-        for connection, _ in zip(list(self._spared(None)), range(ROOM), strict=False):
+        for connection in list(islice(self._spared(None), ROOM)):
             self._close(connection)
         if time.monotonic() - self._said >= SAID_SECONDS:
             self._said = time.monotonic()
@@ -110,8 +126,10 @@ class Connections:
     def _spared(self, new: LimitedProtocol | None) -> Iterator[LimitedProtocol]:
         """Yield connections that can be closed, without the new one: strangers before those who have the token."""
         others = [one for one in self._open if one is not new]
-        yield from (one for one in others if not one.is_known and not one.is_whole())
-        yield from (one for one in others if not one.is_known and one.is_whole())
+        strangers = [one for one in others if not one.is_known]
+        yield from (one for one in strangers if not one.is_unread and not one.is_whole())
+        yield from (one for one in strangers if one.is_whole())
+        yield from (one for one in strangers if one.is_unread and not one.is_whole())
         yield from (one for one in others if one.is_known and not one.is_whole())
 
     def _close(self, connection: LimitedProtocol) -> None:
@@ -168,11 +186,21 @@ class LimitedProtocol(H11Protocol):
         super().connection_made(transport)
         self.conn = _BoundedHead(h11.SERVER, MOST_HEAD)
         self.is_known = False
+        self.is_unread = True
+        self.loop.call_soon(self._let_read, PASSES_UNREAD)
+        self._requests = 0
         self._received = 0
         self._unsent = 0
         self._phase: tuple[str, object] = ("head", None)
         self._left = HEAD_SECONDS
         self.all_open.add(self)
+
+    def _let_read(self, passes: int) -> None:
+        """Note that what was sent with the connection is read once so many passes of the event loop are over."""
+        if passes:
+            self.loop.call_soon(self._let_read, passes - 1)
+        else:
+            self.is_unread = False
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End."""
@@ -189,10 +217,18 @@ class LimitedProtocol(H11Protocol):
         before = self.cycle
         super().handle_events()
         if self.cycle is not before:  # its task has not begun yet
-            self.scope.setdefault("extensions", {})[KNOWN] = {"tell": self._become_known}
+            self._requests += 1
+            self.scope.setdefault("extensions", {})[KNOWN] = {"tell": self._become_known, "turn": self._turn}
 
     def _become_known(self) -> None:
         self.is_known = True
+
+    async def _turn(self, is_brief: bool) -> bool:
+        """Wait for the turn of a stranger's request; return whether the connection is still open.
+
+        A brief request waits for none when it is the first of its connection.
+        """
+        return (is_brief and self._requests == 1) or await self.all_open.turns.wait(self)
 
     def resume_writing(self) -> None:
         """Note that the answer is read."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -46,8 +46,8 @@ def serve_page(app: FastAPI) -> None:
         app.add_api_route(address, _sender(path), methods=["GET"], include_in_schema=False)
 
 
-def _sender(path: Path) -> Callable[[], Response]:
-    def send() -> Response:
+def _sender(path: Path) -> Callable[[], Awaitable[Response]]:
+    async def send() -> Response:  # without a thread: strangers would hold all of them
         # a checkout is edited while it is served
         headers = {"Content-Security-Policy": POLICY, "Cache-Control": "no-cache"}
         return Response(path.read_bytes(), media_type=TYPES[path.suffix], headers=headers)

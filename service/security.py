@@ -20,7 +20,8 @@ from vibroimpact.service.page_files import page_files
 from vibroimpact.service.problems import answer
 from vibroimpact.service.sessions import Sessions
 
-OPEN_PATHS = ("/healthz", *page_files())
+HEALTH = "/healthz"
+OPEN_PATHS = (HEALTH, *page_files())
 """What is answered without a token."""
 MOST_BYTES = 4 * 2**20
 """Size of a request, byte."""
@@ -120,8 +121,11 @@ class Guarded:
         headers = dict(scope["headers"])
         is_known = self._is_known(headers, scope["method"])
         refused = self._refused(scope, headers, is_known)
-        if is_known and (connection := scope.get("extensions", {}).get(KNOWN)):
-            connection["tell"]()
+        if connection := scope.get("extensions", {}).get(KNOWN):
+            if is_known:
+                connection["tell"]()
+            elif not await connection["turn"](scope["path"] == HEALTH):
+                return
         await (refused or self._app)(scope, receive, with_headers)
 
     def _refused(self, scope: Scope, headers: dict[bytes, bytes], is_known: bool) -> Application | None:

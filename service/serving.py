@@ -34,7 +34,9 @@ from vibroimpact.service.supervisor import Supervisor
 FMUS_HELD = 8
 """Unpacked FMUs that the service itself keeps from being swept: it reads their descriptions, its jobs run them."""
 BACKLOG = 128
-"""Connections that wait to be taken, and are taken in one turn of the event loop."""
+"""Connections that are taken in one turn of the event loop."""
+MOST_UNTAKEN = 4096
+"""Connections that wait to be taken; the system drops one more, whose client tries again after 1 s."""
 LAST_SECONDS = 2
 """For answers that are under way when the service is told to end."""
 
@@ -102,6 +104,8 @@ class _Server(uvicorn.Server):
         """Begin to listen."""
         asyncio.get_running_loop().set_exception_handler(self._connections.on_loop_error)
         await super().startup(sockets)
+        for listening in sockets or ():
+            listening.listen(MOST_UNTAKEN)  # asyncio has made it as long as its own turns
 
 
 def _make_own(folder: Path) -> None:
@@ -163,7 +167,7 @@ def _bound(host: str, port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((host, port))
-        listening.listen(BACKLOG)  # who reads the address below may ask at once
+        listening.listen(MOST_UNTAKEN)  # who reads the address below may ask at once
     except OSError as error:
         listening.close()
         raise UsageError(

@@ -14,5 +14,5 @@ A kind is a module of this folder whose name does not begin with `_` or `test_`:
 The case follows from the seed alone. `check` runs in a process of its own in which warnings are errors; the current
 folder is empty, belongs to the case, and is removed with all that is in it (`tempfile` uses it too). An exception,
 a process that dies and one that does not answer are problems as well; the runner says where. One case again, in a
-debugger if need be: `PYTHONPATH=tests python -m soak KIND SEED`.
+debugger if need be: `PYTHONPATH=tests python -m soak KIND SEED`; some kinds: `python -m soak KIND ...`.
 """

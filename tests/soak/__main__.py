@@ -1,4 +1,7 @@
-"""`make soak`: all kinds, many cases each, side by side; resumable; or one case: `python -m soak KIND SEED`."""
+"""`make soak`: all kinds, many cases each, side by side; resumable.
+
+`python -m soak KIND ...` runs these kinds alone; `python -m soak KIND SEED` tries one case.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +30,16 @@ PROBLEMS_SHOWN = 20
 
 def main(arguments: Sequence[str]) -> int:
     """Run one case or all; return the exit code: 0 no problem, 1 some, 2 misused."""
-    if len(arguments) == 2:
+    if len(arguments) == 2 and arguments[1].isdecimal():
         seconds, problem = attempt(arguments[0], "soak", int(arguments[1]))
         print(f"{arguments[0]} {arguments[1]}: {problem or 'no problem'} ({seconds:.2f} s)")
         return int(problem is not None)
-    chosen = os.environ.get("KINDS", "").replace(",", " ").split() or names()
+    chosen = [*arguments] or os.environ.get("KINDS", "").replace(",", " ").split() or names()
     if unknown := sorted(set(chosen) - set(names())):
+        where = "kinds" if arguments else "KINDS"
         print(
-            f"soak: KINDS: expected some of {', '.join(names())}, got {', '.join(unknown)}.", file=sys.stderr
+            f"soak: {where}: expected some of {', '.join(names())}, got {', '.join(unknown)}.",
+            file=sys.stderr,
         )
         return 2
     kinds = [kind(name) for name in chosen]

@@ -5,31 +5,44 @@ from __future__ import annotations
 import os
 import random
 import resource
-import select
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableSequence
 
 NOBODY = 65534
 """User and group of strangers, where this user may become another."""
 MOST_OPEN = 1500
+"""Connections that one stranger keeps open."""
+DESCRIPTORS = 4096
+"""Open files that a stranger allows itself, where the system does."""
+WAY_SECONDS = 3.0
+"""Time after which a stranger goes on to the next way, s."""
 Place = tuple[str, int]
 HOST = b"Host: 127.0.0.1\r\n"
 ANYTHING = b"GET /api/v1/campaigns HTTP/1.1\r\n" + HOST + b"\r\n"
 
 
-def attack(place: Place, ways: list[str], seed: int, seconds: float) -> None:
-    """Do what the ways say, as another user where that is allowed, for so many seconds."""
+def attack(place: Place, ways: list[str], seed: int, seconds: float, opened: MutableSequence[int]) -> None:
+    """Do what the ways say for so many seconds, as another user where that is allowed.
+
+    `opened` counts the connections of each of `WAYS`, in their order.
+    """
+    _become_a_stranger()
+    chance, end = random.Random(seed), time.monotonic() + seconds
+    while time.monotonic() < end:
+        for way in ways:
+            opened[list(WAYS).index(way)] += WAYS[way](
+                place, chance, min(end, time.monotonic() + WAY_SECONDS)
+            )
+
+
+def _become_a_stranger() -> None:
     if os.geteuid() == 0:
         os.setgroups([])
         os.setgid(NOBODY)
         os.setuid(NOBODY)
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096), hard))
-    chance, end = random.Random(seed), time.monotonic() + seconds
-    while time.monotonic() < end:
-        for way in ways:
-            WAYS[way](place, chance, min(end, time.monotonic() + 3.0))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, DESCRIPTORS), hard))
 
 
 def _opened(place: Place, count: int, end: float) -> Iterator[socket.socket]:
@@ -54,18 +67,23 @@ def _sent(connection: socket.socket, content: bytes) -> bool:
     return True
 
 
-def idle(place: Place, chance: random.Random, end: float) -> None:
+def idle(place: Place, chance: random.Random, end: float) -> int:
     """Open as many connections as may be, and say nothing or half a request."""
     kept = []
     for connection in _opened(place, MOST_OPEN, end):
         kept.append(connection)
         _sent(connection, chance.choice([b"", b"G", ANYTHING[:-2], HOST]))
     time.sleep(max(end - time.monotonic(), 0.0))
-    for connection in kept:
+    return _closed(kept)
+
+
+def _closed(connections: list[socket.socket]) -> int:
+    for connection in connections:
         connection.close()
+    return len(connections)
 
 
-def slow(place: Place, chance: random.Random, end: float) -> None:
+def slow(place: Place, chance: random.Random, end: float) -> int:
     """Send heads and bodies byte by byte."""
     body = b"POST /api/v1/recordings?name=a.txt HTTP/1.1\r\n" + HOST + b"Content-Length: 100000000\r\n\r\n"
     kept = list(_opened(place, 100, end))
@@ -75,11 +93,10 @@ def slow(place: Place, chance: random.Random, end: float) -> None:
         for connection in kept:
             _sent(connection, b"x")
         time.sleep(0.2)
-    for connection in kept:
-        connection.close()
+    return _closed(kept)
 
 
-def huge(place: Place, chance: random.Random, end: float) -> None:
+def huge(place: Place, chance: random.Random, end: float) -> int:
     """Send heads, cookies and bodies of megabytes."""
     heads = [
         b"GET / HTTP/1.1\r\n" + HOST + b'Cookie: x="' + b"\\" * 60_000 + b'"\r\n\r\n',
@@ -88,44 +105,44 @@ def huge(place: Place, chance: random.Random, end: float) -> None:
         b"POST /api/v1/campaigns HTTP/1.1\r\n" + HOST + b"Content-Length: 4000000\r\n\r\n" + b"[" * 4_000_000,
         b"POST / HTTP/1.1\r\n" + HOST + b"Transfer-Encoding: chunked\r\n\r\nffffff\r\n" + b"x" * 4_000_000,
     ]
+    count = 0
     while time.monotonic() < end:
         for connection in _opened(place, 8, end):
             with connection:
                 _sent(connection, chance.choice(heads))
+            count += 1
+    return count
 
 
-def many(place: Place, chance: random.Random, end: float) -> None:
+def many(place: Place, chance: random.Random, end: float) -> int:
     """Ask for anything, many times on a connection, without reading an answer."""
     paths = [b"/", b"/page/main.js", b"/api/v1/campaigns", b"/metrics", b"/nothing/%00"]
-    kept = []
+    kept: list[socket.socket] = []
+    count = 0
     while time.monotonic() < end:
         for connection in _opened(place, 20, end):
             kept.append(connection)
             _sent(connection, ANYTHING.replace(b"/api/v1/campaigns", chance.choice(paths)) * 20)
         time.sleep(0.05)
-        for connection in kept[:-200]:
-            connection.close()
+        count += _closed(kept[:-200])
         kept = kept[-200:]
-    for connection in kept:
-        connection.close()
+    return count + _closed(kept)
 
 
-def half_closed(place: Place, chance: random.Random, end: float) -> None:
+def half_closed(place: Place, chance: random.Random, end: float) -> int:
     """Close one side after a part of a request, or noise, and keep the other."""
     kept = []
     for connection in _opened(place, 300, end):
         kept.append(connection)
         _sent(connection, chance.choice([ANYTHING, ANYTHING[:30], chance.randbytes(2000), b""]))
-        if select.select([], [connection], [], 0.0)[1]:
-            try:
-                connection.shutdown(chance.choice([socket.SHUT_WR, socket.SHUT_RD]))
-            except OSError:
-                continue  # the service was faster
+        try:
+            connection.shutdown(chance.choice([socket.SHUT_WR, socket.SHUT_RD]))
+        except OSError:
+            continue  # the service was faster
     time.sleep(min(max(end - time.monotonic(), 0.0), 1.0))
-    for connection in kept:
-        connection.close()
+    return _closed(kept)
 
 
-WAYS: dict[str, Callable[[Place, random.Random, float], None]] = {
+WAYS: dict[str, Callable[[Place, random.Random, float], int]] = {
     one.__name__: one for one in (idle, slow, huge, many, half_closed)
 }

@@ -11,7 +11,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from soak import __main__ as soak_main
 from soak import _child
+from soak.__main__ import main
 from soak._journal import Journal, Tried, state_of_the_code
 from soak._kinds import SEED_STRIDE, Kind, kind, names
 from soak._runner import run
@@ -150,3 +152,21 @@ def test_what_was_tried_with_other_sources_is_tried_again(tmp_path: Path) -> Non
     assert state_of_the_code(tmp_path) == before
     (tmp_path / "fmus" / "body.c").write_text("int b;")
     assert state_of_the_code(tmp_path) != before
+
+
+@pytest.mark.parametrize("arguments", [["nothing"], ["extremes", "nothing"], ["extremes", "-1"]])
+def test_kinds_that_are_none_are_refused_before_anything_is_tried(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("soak: kinds: expected some of archives, attractors, ")
+    assert said.endswith(f", got {arguments[-1]}.\n")
+
+
+def test_arguments_choose_the_kinds(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen: list[list[str]] = []
+    monkeypatch.setattr(soak_main, "_soak", lambda kinds, *_: chosen.append([one.name for one in kinds]) or 0)
+    assert main(["service_strangers"]) == 0
+    assert main(["extremes", "scenes"]) == 0
+    assert chosen == [["service_strangers"], ["extremes", "scenes"]]

@@ -35,19 +35,20 @@ LARGE = ASKED.replace(b"/ ", b"/large ")
 BODY = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 400000\r\n\r\n"
 CHUNKED = BODY.replace(b"Content-Length: 400000", b"Transfer-Encoding: chunked")
 REFUSED = BODY.replace(b"/ ", b"/refused ")
+HELD = ASKED.replace(b"/ ", b"/held ")
 LENGTH = 16_000_000
 """Of the large answer, byte: more than the buffers of a connection hold."""
 
 
 async def answering(scope: Any, receive: Any, send: Any) -> None:
-    """Answer a request once it is whole; `/refused` at once, `/large` with more than a socket holds."""
+    """Answer a request once it is whole; `/refused` at once, `/held` never, `/large` with more than a socket holds."""
     if scope["path"] == "/own":
         scope["extensions"][KNOWN]["tell"]()
     while scope["path"] != "/refused":
         message = await receive()
         if message["type"] == "http.disconnect":
             return
-        if not message["more_body"]:
+        if not message["more_body"] and scope["path"] != "/held":
             break
     body = bytes(LENGTH if scope["path"] == "/large" else 2)
     head = [(b"content-length", str(len(body)).encode())]
@@ -190,6 +191,19 @@ def test_one_who_asks_at_once_is_answered_among_any_number_who_do_not(listening:
         listening.open(sent)
         assert len(listening.connections) <= MOST
     assert listening.open(ASKED).recv(12).endswith(b" 200")
+
+
+def test_connections_that_come_together_are_read_before_one_of_them_is_closed(listening: Listening) -> None:
+    for _ in range(MOST):
+        listening.open(HELD)  # whole requests, which are closed last
+    busy = threading.Event()
+    listening.loop.call_soon_threadsafe(busy.wait)
+    together = [socket.create_connection(listening.socket.getsockname(), 20.0) for _ in range(MOST)]
+    listening.opened += together
+    for one in together:
+        one.sendall(ASKED)
+    busy.set()
+    assert all(one.recv(12).endswith(b" 200") for one in together)
 
 
 def test_who_has_the_token_keeps_the_connection_while_strangers_come(listening: Listening) -> None:
