@@ -37,7 +37,8 @@ class Turns:
 
     async def wait(self, connection: object) -> bool:
         """Wait for the turn of a connection; return whether it came before the connection left."""
-        turn = self._waiting[connection] = asyncio.get_running_loop().create_future()
+        turn: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        self._waiting[connection] = turn
         if not self._is_planned:
             self._plan()
         return await turn
