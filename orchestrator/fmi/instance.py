@@ -144,13 +144,13 @@ class Instance(ABC):
                 word += ", a step that goes on by itself (canRunAsynchronuously), which no importer here waits for,"
             self.fail(function, f"returned {word} at time {self.time:.17g}")
 
-    def fail(self, function: str, what: str) -> NoReturn:
-        """Raise ComponentError: what a function of the FMU did, and the last line that it logged."""
+    def fail(self, function: str, what: str, kind: type[ComponentError] = ComponentError) -> NoReturn:
+        """Raise an error of a kind: what a function of the FMU did, and the last line that it logged."""
         lines = self.log.take()
         reason = lines[-1] if lines else "the component logged nothing"
         # Our own components say who and where too: once is enough.
         reason = reason.removeprefix(f"{self.name}: {self.prefix}{function}: ")
-        raise ComponentError(
+        raise kind(
             f"{self.name}: {self.prefix}{function} {what}: {reason}",
             instance=self.name,
             function=self.prefix + function,

@@ -7,6 +7,7 @@ import math
 from ctypes import c_char_p, c_double, c_int, c_void_p
 from pathlib import Path
 
+from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import (
     DISCARD,
@@ -91,7 +92,7 @@ class Instance2(Instance):
             c_int(1),  # loggingOn: some FMUs report even fatal errors only then
         )
         if not pointer:
-            self.fail("Instantiate", f"made no instance of {self.fmu.source}")
+            self.fail("Instantiate", f"made no instance of {self.fmu.source}", ComponentFileError)
         self._pointer.value = pointer
 
     def _take_kept(self) -> bool:

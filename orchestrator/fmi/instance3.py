@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint16, c_uint32, c_void_p
 
+from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, NO_STATE_PRIOR_TO_POINT, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
@@ -71,7 +72,7 @@ class Instance3(Instance):
             *texts, *flags, *no_variables, self.log.environment, callback("fmi3"), c_void_p()
         )
         if not pointer:
-            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}")
+            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}", ComponentFileError)
         self._pointer.value = pointer
 
     def _bind_events(self) -> None:

@@ -156,9 +156,9 @@ class Component:
 
     def _named_tool(self, refusal: ComponentError) -> ComponentError:
         """Return why there is no instance, with the tool that must be there."""
-        if not self.capabilities.tool or isinstance(refusal, ComponentFileError):
+        if not self.capabilities.tool or not refusal.function:  # a library that does not load needs no tool
             return refusal
-        return ComponentError(
+        return type(refusal)(
             f"{refusal} It needs {self.capabilities.tool} on this machine ({NEEDS_TOOL}).",
             instance=refusal.instance,
             function=refusal.function,

@@ -108,3 +108,17 @@ def test_an_fmu_that_does_not_check_its_token_is_a_remark_of_who_loads_it(tmp_pa
     fmu_factory.gain(tmp_path, token=fmu_factory.ANY_TOKEN).rename(tmp_path / "g.fmu")
     remark = "expected no instance for a wrong token, got one: its token is not checked."
     commands_take(tmp_path, remark, by_loading=True)
+
+
+@pytest.mark.parametrize("guard", ["false", "true"])
+def test_an_fmu_of_another_token_is_refused_by_every_command_with_one_exit_code(
+    guard: str, tmp_path: Path
+) -> None:
+    redescribed(fmu_factory.gain(tmp_path), tmp_path / "g.fmu", ('guid="{', 'guid="{another '))
+    scene, dataset = tmp_path / "s.toml", tmp_path / "r.nc"
+    scene.write_text(SCENE.replace("guard = false", f"guard = {guard}"))
+    for command in (("run", scene, "-o", dataset), ("check", scene), ("fmu", "check", tmp_path / "g.fmu")):
+        refused = in_this_process(*command)
+        assert refused.returncode == 2, refused.stderr
+        assert "made no instance" in refused.stderr or "expected an instance for the token" in refused.stderr
+    assert not dataset.exists()

@@ -37,6 +37,7 @@ _ANYWHERE = {
 _MOST_ROUNDS, _MOST_ERRORS = 20, 1000
 #: Refusals that are told, and characters of a name that is compared with the schema's or of a value that is repeated.
 _MOST_TOLD, _LONGEST = 10, 80
+_BOOLEAN = "'xs:boolean'"
 _ATTRIBUTE = re.compile(r"attribute '([^']+)'")
 
 
@@ -161,6 +162,13 @@ class _Amendments:
         return True
 
     def _drop_attribute(self, error: Any, element: Any, name: str) -> bool:
+        if _BOOLEAN in error.message and element.get(name).strip().lower() in ("true", "false"):
+            element.set(name, element.get(name).strip().lower())
+            text = (
+                f"{element.tag}: {name}: expected true or false in small letters, got others. Read as them."
+            )
+            self._findings.add(Grade.remark, text)
+            return True
         misplaced = "is not allowed" in error.message and "attribute" in error.message
         if not misplaced and name not in INCONSEQUENTIAL | DISPENSABLE:
             return False

@@ -177,6 +177,16 @@ def test_an_attribute_of_no_consequence_with_a_bad_value_is_a_remark_and_others_
             gain2(change)
 
 
+@pytest.mark.parametrize(("written", "read_as"), [("True", True), ("FALSE", False)])
+def test_truth_in_capitals_is_truth(written: str, read_as: bool) -> None:
+    flag = 'canHandleVariableCommunicationStepSize="{}"'
+    found = gain2((flag.format("true"), flag.format(written)))
+    assert only(found).grade is Grade.remark
+    assert found.description.coSimulation.canHandleVariableCommunicationStepSize is read_as
+    with pytest.raises(ComponentFileError, match="'maybe' is not a valid value"):
+        gain2((flag.format("true"), flag.format("maybe")))
+
+
 def test_an_element_elsewhere_is_read_there_and_one_of_no_meaning_left_out() -> None:
     text = content_of("Gain", "2.0").decode()
     begin, end = text.index("  <DefaultExperiment"), text.index("  <ModelVariables>")
