@@ -35,6 +35,8 @@ _DEGREES = re.compile(r"°(?![A-Za-z])")
 _DETECTED = re.compile(r"(?P<unit>\S.*?)(?:\s+|(?<=[VAgG²2]))(?:RMS|rms|Rms|pk|pk-pk|p-p|pp|peak)")
 """A unit, and how the instrument took the value: its size stays that of the unit."""
 _LONGEST_DETECTED = 60
+_LONGEST_LABEL = 200
+"""Characters of a label above which it is no unit: a product is read factor by factor, each as long as the rest."""
 _SUPERSCRIPTS = str.maketrans("¹²³⁻", "123-")
 _FACTOR = re.compile(
     r"(?:(?P<number>\d{1,9}(?:\.\d{0,18})?(?:[eE][-+]?\d{1,2})?)|(?P<name>[A-Za-zµμΩ_%]{1,30}))"
@@ -105,6 +107,8 @@ def measured_unit(label: str) -> MeasuredUnit:
     """
     import pint
 
+    if len(label) > _LONGEST_LABEL:
+        raise _unknown(label)
     text = _DEGREES.sub("deg", label.strip().translate(_SUPERSCRIPTS))
     detected = _DETECTED.fullmatch(text) if len(text) <= _LONGEST_DETECTED else None
     if detected is not None:
@@ -121,12 +125,16 @@ def measured_unit(label: str) -> MeasuredUnit:
         AttributeError,
         ArithmeticError,
     ) as problem:
-        raise DatasetError(
-            f"unit: expected a unit such as m/s^2, g, V, mV or N, got {label[:60]!r}. "
-            "Give the channel's unit yourself."
-        ) from problem
+        raise _unknown(label) from problem
     factor, si = float(base.magnitude), _si_name(base)
     return MeasuredUnit(label, si if factor == 1.0 else f"{factor:.15g} {si}", si, factor)
+
+
+def _unknown(label: str) -> DatasetError:
+    return DatasetError(
+        f"unit: expected a unit such as m/s^2, g, V, mV or N, got {label[:60]!r}. "
+        "Give the channel's unit yourself."
+    )
 
 
 def _product(text: str) -> Any:

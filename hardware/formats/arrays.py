@@ -36,6 +36,8 @@ class Scope:
         Samples per second of all its arrays.
     around : Scope or None
         What it lies in; its clock holds here too where there is none.
+    numbers : int
+        Numbers that were read into the outermost structure and all within it; kept where reading stops at a limit.
     """
 
     path: str = ""
@@ -43,6 +45,7 @@ class Scope:
     units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
     around: Scope | None = None
+    numbers: int = 0
 
     def within(self, name: str) -> Scope:
         """Return a structure of this name that lies in this one."""

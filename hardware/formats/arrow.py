@@ -57,7 +57,8 @@ def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
     import pyarrow.parquet
 
     if kind == "Parquet":
-        with pyarrow.parquet.ParquetFile(path, memory_map=False) as file:
+        # pages may carry a CRC-32, at which the library looks only when it is told to
+        with pyarrow.parquet.ParquetFile(path, memory_map=False, page_checksum_verification=True) as file:
             names, remarks = _chosen(file.schema_arrow)
             _check_size(file.metadata.num_rows, len(names))
             return file.read(columns=names, use_threads=False), remarks

@@ -6,14 +6,15 @@ import csv
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
-from itertools import pairwise, zip_longest
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.instants import is_clock, is_date, is_day, read_instants
-from vibroimpact.hardware.formats.table import Column, Floats
+from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats
 
 # Instruments write these for an input that is beyond its range, or open.
 OVERRANGE_WORDS = frozenset(
@@ -92,22 +93,70 @@ def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str, dates:
 
     Cells are separated by the delimiter, by blanks where it is None. `dates` is the order of day and month; empty: it
     is found. A column of days beside one of times of day gives them their dates, and is empty.
+
+    Raises
+    ------
+    DatasetError
+        There are more columns, or more cells, than one import takes.
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
+        _refuse_wide(len(quick), 1)
         return [column_of("", values) for values in quick]
     rows = [split_line(line, delimiter) for line in lines]
-    written = list(zip_longest(*rows, fillvalue=""))
+    widths = set(map(len, rows))
+    _refuse_wide(max(widths, default=0), len(rows))
+    written = [_Cells(cells) for cells in zip(*rows, strict=True)] if len(widths) < 2 else _ragged(rows)
     columns = [_read_column(cells, decimal, dates) for cells in written]
     for place, (days, clock) in enumerate(pairwise(written)):
-        if _are_days(days) and is_clock(_first(clock)):
-            together = _with_days(days, clock, dates)
+        if _are_days(days.texts) and is_clock(_first(clock.texts)):
+            together = _with_days(days.of_rows(len(rows)), clock.of_rows(len(rows)), dates)
             if together is not None:
                 columns[place], columns[place + 1] = (
                     replace(columns[place], values=_NONE, strange=()),
                     together,
                 )
     return columns
+
+
+@dataclass(frozen=True, slots=True)
+class _Cells:
+    """Cells of a column, and their rows; None: they stand in all rows from the first one on."""
+
+    texts: Sequence[str]
+    rows: Sequence[int] | None = None
+
+    def of_rows(self, count: int) -> Sequence[str]:
+        """Return a cell for each row; empty where the column has none."""
+        if self.rows is None:
+            return self.texts
+        cells = [""] * count
+        for row, text in zip(self.rows, self.texts, strict=True):
+            cells[row] = text
+        return cells
+
+
+def _ragged(rows: Sequence[Sequence[str]]) -> list[_Cells]:
+    """Return the cells that are not empty of rows of different widths: a wide row costs its own cells alone."""
+    texts: list[list[str]] = [[] for _ in range(max(map(len, rows)))]
+    places: list[list[int]] = [[] for _ in texts]
+    for row, cells in enumerate(rows):
+        for column, cell in enumerate(cells):
+            if cell.strip():
+                texts[column].append(cell)
+                places[column].append(row)
+    return [_Cells(*one) for one in zip(texts, places, strict=True)]
+
+
+def _refuse_wide(columns: int, rows: int) -> None:
+    """Raise DatasetError for more columns than a file has, or for short rows beside wide ones that fill the memory."""
+    if columns > MOST_COLUMNS:
+        raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {columns}. Is it turned over?")
+    if rows * (columns - 1) > MOST_SAMPLES:
+        raise DatasetError(
+            f"expected at most {MOST_SAMPLES} cells beside the instants, got {rows} rows of up to {columns} cells. "
+            "Cut it into pieces."
+        )
 
 
 def _first(cells: Sequence[str]) -> str:
@@ -169,14 +218,30 @@ def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Colum
     return Column(label, values, unit, overrange if np.any(overrange) else None, **facts)
 
 
-def _read_column(cells: Sequence[str], decimal: str, dates: str) -> Column:
+def _read_column(written: _Cells, decimal: str, dates: str) -> Column:
     """Read one column up to its last cell that is not empty."""
+    cells = written.texts
     length = next((row for row in range(len(cells), 0, -1) if cells[row - 1].strip()), 0)
-    cells = cells[:length]
+    column = _read_texts(cells[:length], decimal, dates)
+    rows = written.rows
+    if rows is None or not length:
+        return column
+    values = np.full(rows[-1] + 1, np.nan)
+    values[rows] = column.values
+    overrange = None
+    if column.overrange is not None:
+        overrange = np.zeros(len(values), dtype=bool)
+        overrange[rows] = column.overrange
+    strange = [(rows[place], text) for place, text in column.strange]
+    return replace(column, values=values, overrange=overrange, strange=strange)
+
+
+def _read_texts(cells: Sequence[str], decimal: str, dates: str) -> Column:
+    """Read cells as instants where the first of them is one, else as numbers."""
     if is_date(_first(cells)):
         return read_instants(cells, is_marker, dates)
     strange: list[tuple[int, str]] = []
-    values = np.full(length, np.nan)
+    values = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells):
         text = _with_point(cell.strip(), decimal)
         if _NUMBER.fullmatch(text):

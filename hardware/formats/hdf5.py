@@ -138,8 +138,8 @@ def _why_not(item: Any, matlab: bool) -> str:
 
 def _read_dataset(name: str, item: Any, scope: Scope, scopes: list[Scope], matlab: bool) -> None:
     """Read the values of a dataset; its own rate makes it a structure of its own."""
-    there = sum(array.size for one in scopes for array in one.arrays.values())
-    if there + item.size > MOST_SAMPLES:
+    scopes[0].numbers += item.size
+    if scopes[0].numbers > MOST_SAMPLES:
         raise DatasetError(f"expected at most {MOST_SAMPLES} numbers, got more. Save fewer datasets.")
     own = Scope(scope.path, around=scope)
     _read_rate(item, own)

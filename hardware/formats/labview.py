@@ -196,7 +196,7 @@ def _tables(
         remarks.append(f"the file notes: {' '.join(cell for cell in segment.header['Notes'] if cell)}")
     if _first(header, "X_Columns", "One").lower() == "multi":
         return _paired_tables(columns, segment.header, late, title), remarks
-    declared = _declared(segment.header, len(columns))
+    declared = _Declared.of(segment.header, len(columns))
     channels = [
         _declare(column, declared, number, late)
         for number, column in enumerate(columns[1:])
@@ -229,7 +229,7 @@ def _without_false_units(columns: list[Column], remarks: list[str]) -> list[Colu
 def _paired_tables(columns: Sequence[Column], header: Header, late: float, title: str) -> list[Table]:
     """Return a table for each pair of instants and channel (`X_Columns` Multi)."""
     pairs = [(columns[place], columns[place + 1]) for place in range(0, len(columns) - 1, 2)]
-    declared = _declared(header, len(pairs), step=2)
+    declared = _Declared.of(header, len(pairs), step=2)
     tables = []
     for number, (time, column) in enumerate(pairs):
         if len(column.values):
@@ -238,24 +238,33 @@ def _paired_tables(columns: Sequence[Column], header: Header, late: float, title
     return tables
 
 
-def _declared(header: Header, channels: int, step: int = 1) -> dict[str, list[str]]:
-    """Return the entries of a segment header by channel.
+@dataclass(frozen=True, slots=True)
+class _Declared:
+    """The entries of a segment header by channel, when each channel began, and when the first of them did."""
 
-    With a column of instants for each channel, the entries stand above every second column; some writers give
-    them without the empty cells between.
-    """
-    entries = {}
-    for key, cells in header.items():
-        spread = step > 1 and not any(cells[1::step]) and len(cells) > channels
-        entries[key] = [*(cells[::step] if spread else cells), *[""] * channels][:channels]
-    return entries
+    entries: Header
+    stamps: Sequence[np.datetime64 | None]
+    earliest: np.datetime64 | None
+
+    @classmethod
+    def of(cls, header: Header, channels: int, step: int = 1) -> _Declared:
+        """Return the entries of a header.
+
+        With a column of instants for each channel, the entries stand above every second column; some writers give
+        them without the empty cells between.
+        """
+        entries = {}
+        for key, cells in header.items():
+            spread = step > 1 and not any(cells[1::step]) and len(cells) > channels
+            entries[key] = [*(cells[::step] if spread else cells), *[""] * channels][:channels]
+        return cls(entries, _stamps(entries), _earliest(entries))
 
 
-def _declare(column: Column, declared: Mapping[str, Sequence[str]], number: int, late: float) -> Column:
+def _declare(column: Column, declared: _Declared, number: int, late: float) -> Column:
     """Return a column with what its segment header says of it."""
 
     def entry(key: str) -> str:
-        cells = declared.get(key, ())
+        cells = declared.entries.get(key, ())
         return cells[number] if number < len(cells) else ""
 
     def quantity(key: str) -> float | None:
@@ -266,8 +275,8 @@ def _declare(column: Column, declared: Mapping[str, Sequence[str]], number: int,
     over_time = entry("X_Dimension").lower() in ("time", "")
     interval = quantity("Delta_X") if over_time else None
     samples = quantity("Samples")
-    stamps = _stamps(declared)
-    behind = _seconds_between(_earliest(declared), stamps[number] if number < len(stamps) else None)
+    stamps = declared.stamps
+    behind = _seconds_between(declared.earliest, stamps[number] if number < len(stamps) else None)
     return Column(
         label or column.label,
         column.values,

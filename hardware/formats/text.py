@@ -151,8 +151,6 @@ def _parsed(content: str, delimiter: str | None, decimal: str, dates: str) -> _P
     rows, cut = without_cut_cells(rows, content, dialect.delimiter, dialect.decimal)
     remarks += dropped + cut + _grouped(rows, dialect)
     cells = read_cells(rows, dialect.delimiter, dialect.decimal, dates)
-    if len(cells) > MOST_COLUMNS:
-        raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")
     labels, units, late = _all_headings(lines[:first], rows, len(cells), dialect.delimiter)
     columns, more = columns_of(cells, labels, units)
     return _Parsed(dialect, columns, remarks + late + more)

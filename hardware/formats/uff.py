@@ -118,7 +118,7 @@ def _sorted_out(
             f"the units of the file are {units.get('units_description', '')!r}, not SI ({option('unit')})"
         )
     repeated = Counter(text_of(found.get("id1")) for found in functions)
-    tables: list[Table] = []
+    by_instants: dict[bytes, Table] = {}
     even: list[Column] = []
     for number, found in enumerate(functions, 1):
         name = _label(found, repeated[text_of(found.get("id1"))] > 1) or f"function {number}"
@@ -133,7 +133,8 @@ def _sorted_out(
         if instants is None:
             even.append(column)
         else:
-            _add(tables, column, Column("instants", instants, "s"))
+            _add(by_instants, column, instants)
+    tables = list(by_instants.values())
     if sum(len(column.values) for table in (*tables, Table(even)) for column in table.columns) > MOST_SAMPLES:
         raise DatasetError(f"expected at most {MOST_SAMPLES} samples, got more. Cut it into pieces.")
     if even:
@@ -150,13 +151,14 @@ def _sorted_out(
     return RawFile("universal file (UFF 58)", tables, remarks)
 
 
-def _add(tables: list[Table], column: Column, instants: Column) -> None:
+def _add(tables: dict[bytes, Table], column: Column, instants: Floats) -> None:
     """Add a function to the table that has its instants, or a table of its own."""
-    for at, table in enumerate(tables):
-        if table.time is not None and np.array_equal(table.time.values, instants.values):
-            tables[at] = replace(table, columns=[*table.columns, column], title="")
-            return
-    tables.append(Table([column], instants, column.label))
+    key = (instants + 0.0).tobytes()  # 0 and -0 are one instant
+    table = tables.get(key)
+    if table is None:
+        tables[key] = Table([column], Column("instants", instants, "s"), column.label)
+    else:
+        tables[key] = replace(table, columns=[*table.columns, column], title="")
 
 
 def _why_not(found: Mapping[str, Any]) -> str:

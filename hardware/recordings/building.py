@@ -33,14 +33,14 @@ class Parts:
     ----------
     channels, events, scalars : dict
         By name.
-    remarks : list of str
-        Each once.
+    remarks : dict of str to None
+        In the order in which they were noticed, each once.
     """
 
     channels: dict[str, Channel] = field(default_factory=dict)
     events: dict[str, EventTrain] = field(default_factory=dict)
     scalars: dict[str, SingleValue] = field(default_factory=dict)
-    remarks: list[str] = field(default_factory=list)
+    remarks: dict[str, None] = field(default_factory=dict)
 
     def add(self, source: Source, title: str) -> None:
         """Add the columns of one file, whose remarks begin with a title; empty for one file alone.
@@ -65,9 +65,7 @@ class Parts:
     def remark(self, lines: Sequence[str], title: str = "") -> None:
         """Add what was noticed, each line once."""
         for line in lines:
-            remark = shortened(f"{title}: {line}" if title else line)
-            if remark not in self.remarks:
-                self.remarks.append(remark)
+            self.remarks.setdefault(shortened(f"{title}: {line}" if title else line))
 
     def _add_column(
         self,

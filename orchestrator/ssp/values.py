@@ -27,6 +27,8 @@ TRANSFORMATIONS = (
 )
 
 LONGEST_NAME = 2000
+_MOST_NAMED = 5
+"""Elements that a message lists."""
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 _WHOLE = re.compile(r"\s*[+-]?0{0,100}[0-9]{1,20}\s*", re.ASCII)
 _VERSION = re.compile(r"1\.[0-9]{1,3}(-.*)?|2\.[0-9]{1,3}")
@@ -154,7 +156,9 @@ def _parameter(element: Element, where: str, units: Units) -> Parameter:
             return Parameter(name, read(text, where), units.get(child.get("unit", "")))
         if kind in ("Binary", "Dimension"):
             break
-    got = ", ".join(child.tag.rpartition("}")[2][:60] for child in element) or "none"
+    kinds = [child.tag.rpartition("}")[2][:60] for child in element]
+    more = f" and {len(kinds) - _MOST_NAMED} more" if len(kinds) > _MOST_NAMED else ""
+    got = f"{', '.join(kinds[:_MOST_NAMED])}{more}" or "none"
     raise RefusalError(where, "one number, truth value, text or enumeration item", got)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -303,3 +304,10 @@ def test_remarks_of_an_import_are_counted_in_one_line(tmp_path: Path) -> None:
     (line,) = one.remarks_counted
     assert line.startswith("a.csv: 2 remarks of its import are in its attribute `remarks`")
     assert Recording({}, attrs={"source_file": "a.csv"}).remarks_counted == ()
+
+
+def test_a_text_of_thousands_of_factors_is_no_unit() -> None:
+    started = time.process_time()
+    with pytest.raises(DatasetError, match="expected a unit such as"):
+        measured_unit("m " * 100_000)
+    assert time.process_time() - started < 0.1

@@ -93,3 +93,14 @@ def test_columns_of_one_name_and_tables_of_nothing_are_said(tmp_path: Path, kind
     write(pa.table({"word": ["x", "y"]}), path)
     with pytest.raises(DatasetError, match=r"got none\. Besides, word: its values are string"):
         import_recording([path])
+
+
+def test_a_page_whose_checksum_does_not_fit_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "table.parquet"
+    table = pa.table({"time": np.arange(40.0), "base": np.sin(np.arange(40.0))})
+    parquet.write_table(table, path, compression="none", use_dictionary=False, write_page_checksum=True)
+    content = path.read_bytes()
+    place = content.index(np.sin(np.arange(40.0)).tobytes())
+    path.write_bytes(content[: place + 80] + bytes([content[place + 80] ^ 16]) + content[place + 81 :])
+    with pytest.raises(DatasetError, match=r"table\.parquet: expected a whole Parquet file"):
+        import_recording(path)

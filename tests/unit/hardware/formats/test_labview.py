@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from vibroimpact.analysis.recording import Quality, Recording
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.labview import read_labview
 from vibroimpact.hardware.recordings import import_recording
 
 FILE_HEADER = """LabVIEW Measurement\t
@@ -186,3 +188,22 @@ def test_segments_that_began_at_the_same_instant_have_one_trigger(tmp_path: Path
     assert len(recording.channels) == 2
     assert len(triggers) == (1 if begins == "20:00:00.5" else 2)
     assert ("triggers: the lag" in "\n".join(recording.remarks)) == (len(triggers) == 2)
+
+
+def test_a_thousand_channels_cost_a_thousand_times_one(tmp_path: Path) -> None:
+    many = 1000
+    entries = {"Date": "2026/07/30", "Time": "10:00:00.5", "X0": "0", "Delta_X": "0.5"}
+    header = "".join(key + f"\t{value}" * many + "\n" for key, value in entries.items())
+    row = "\t".join(["", *["1.5"] * many])
+    text = (
+        "LabVIEW Measurement\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\n\n"
+        f"{header}***End_of_Header***\n"
+        + "\t".join(["X_Value", *(f"a{at}" for at in range(many))])
+        + f"\n{row}\n{row}\n"
+    )
+    started = time.process_time()
+    (table,) = read_labview(text).tables
+    assert time.process_time() - started < 1.5
+    assert [column.interval for column in table.columns] == [0.5] * many
+    with pytest.raises(DatasetError, match="at most 1024 columns"):
+        read_labview(text.replace(row, row + "\t2.5" * 100))

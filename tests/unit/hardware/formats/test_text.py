@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from vibroimpact.analysis.recording import Quality, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.cells import read_cells
 from vibroimpact.hardware.formats.text import find_dialect, headings, read_text
 from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
@@ -321,3 +323,40 @@ def test_one_value_beyond_the_range_is_kept_as_such(tmp_path: Path) -> None:
         assert np.isnan(found.scalars["trigger"].value)
     told = "trigger: one value only, which the file marks as overrange: kept beside the channels"
     assert told in recording.remarks
+
+
+def test_a_row_of_many_cells_costs_its_own_cells_alone() -> None:
+    started = time.process_time()
+    (table,) = read_text("t,a\n" + "0.5,\n0.5,1.5\n" * 3000 + "1," * 1000 + "2\n").tables
+    assert time.process_time() - started < 1.0
+    assert len(table.columns) == 1000
+    assert len(table.columns[-1].values) == 6001
+    assert np.isfinite(table.columns[-1].values).sum() == 1
+
+
+def test_short_rows_beside_wide_ones_that_fill_the_memory_are_refused() -> None:
+    started = time.process_time()
+    with pytest.raises(DatasetError, match=r"at most 50000000 cells .* got 60001 rows of up to 1001"):
+        read_text("t,a\n" + "0.5,x\n" * 60_000 + "1," * 1000 + "2\n")
+    with pytest.raises(DatasetError, match="at most 1024 columns, got 100001"):
+        read_text("t,a\n" + "0.5,x\n" * 100 + "1," * 100_000 + "2\n")
+    assert time.process_time() - started < 4.0
+
+
+def test_columns_that_begin_late_or_skip_rows_keep_their_rows() -> None:
+    rows = ["0,1", "1,2", "2,3,OL", "3,4,,10:00:01", "4,5,7.5,10:00:02", "5,6,x,10:00:03.5", "6,7"]
+    cells = read_cells(rows, ",", ".")
+    np.testing.assert_array_equal(cells[1].values, [1, 2, 3, 4, 5, 6, 7])
+    np.testing.assert_array_equal(cells[2].values, [np.nan] * 4 + [7.5, np.nan])
+    assert list(np.flatnonzero(cells[2].overrange)) == [2]
+    assert cells[2].strange == [(5, "x")]
+    np.testing.assert_array_equal(cells[3].values, [np.nan] * 3 + [0.0, 1.0, 2.5])
+    assert cells[3].dated
+
+
+def test_days_beside_clocks_give_them_their_dates_where_rows_differ_in_width() -> None:
+    rows = ["2026-07-30,23:59:59,1", "2026-07-31,00:00:01,2,note", "2026-07-31,00:00:03,3"]
+    days, clock, values, _ = read_cells(rows, ",", ".")
+    assert not len(days.values)
+    np.testing.assert_array_equal(clock.values, [0.0, 2.0, 4.0])
+    np.testing.assert_array_equal(values.values, [1, 2, 3])

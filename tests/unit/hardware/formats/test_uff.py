@@ -12,6 +12,7 @@ import pyuff
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.uff import read_uff
 from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 TIME = np.arange(200) / 256.0
@@ -174,3 +175,17 @@ def test_a_universal_file_cut_after_any_line_of_its_head_is_refused(tmp_path: Pa
         path.write_text("".join(head) + end)
         with pytest.raises(DatasetError, match=r"record\.uff: expected"):
             import_recording([path])
+
+
+def test_functions_of_one_set_of_instants_share_a_table_and_others_have_their_own(tmp_path: Path) -> None:
+    uneven = np.cumsum(1.0 + 0.25 * np.arange(9.0))
+    kinds = {"abscissa_spacing": 0, "data": BASE[:9]}
+    sets = [
+        function("a", **kinds, x=uneven),
+        function("b", **kinds, x=2.0 * uneven),
+        function("c", **kinds, x=uneven),
+    ]
+    first, second = read_uff(written(tmp_path, *sets)).tables
+    assert [column.label for column in first.columns] == ["a", "c"]
+    assert [column.label for column in second.columns] == ["b"]
+    np.testing.assert_allclose(second.time.values, 2.0 * uneven, rtol=1e-5)

@@ -27,6 +27,9 @@ from support.ssp_files import (
 )
 
 from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+from vibroimpact.orchestrator.ssp.values import read_parameter_set
 
 BODY = connector("displacement", "output") + connector("force", "input")
 
@@ -282,3 +285,10 @@ def test_values_out_of_an_archive_that_are_no_values_are_refused(tmp_path: Path,
 
 
 TWICE = f'<ssv:Parameter name="body.mass">{real(2.0)}</ssv:Parameter>'
+
+
+def test_a_parameter_of_thousands_of_values_is_one_short_line() -> None:
+    root = root_of(ssv({"p": real(1.5) * 3000}).encode(), "a.ssv", namespaces=True)
+    with pytest.raises(RefusalError) as refusal:
+        read_parameter_set(root, "a.ssv")
+    assert "got Real, Real, Real, Real, Real and 2995 more" in refusal.value.problem.line("system.ssp")
