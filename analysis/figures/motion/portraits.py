@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.dataset.schema import scene_of
-from vibroimpact.analysis.figures.motion.layers import FEW_TURNS, draw_layers, draw_turns, turn_begins
+from vibroimpact.analysis.figures.motion.layers import FEW_TURNS, draw_turns, turn_begins
 from vibroimpact.analysis.figures.motion.series import (
     first_after_impacts,
     impacts_within,
@@ -57,7 +57,8 @@ class _Orbit(NamedTuple):
 def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
     """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
 
-    Lines end at an impact and begin again after it, joined by dots.
+    Lines end at an impact and begin again after it, joined by dots. Those of a long motion are not joined: dots of many
+    jumps would be a solid band.
     """
     samples = samples_within(dataset, view)
     orbits = _sampled_orbits(samples)
@@ -92,17 +93,13 @@ def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
     """Draw one line, broken where the velocity jumps; the turns of a long one are layers."""
     x, y = (with_gaps(values, jumps) for values in (orbit.displacement, orbit.velocity))
     draw_turns(axis, x, y, color=colour, label=orbit.words, rasterized=True)
-    if not jumps.size:
+    if not jumps.size or turn_begins(orbit.velocity).size > FEW_TURNS:
         return
-    style = {"color": colour, "linestyle": ":", "rasterized": True}
     both = [np.stack([values[jumps - 1], values[jumps]], axis=1) for values in orbit[2:]]
     pairs = np.stack(both, axis=2)
-    if turn_begins(orbit.velocity).size > FEW_TURNS:
-        draw_layers(axis, pairs, **style)
-        return
     gaps = np.full((jumps.size, 1, 2), np.nan)
     joined = np.concatenate([pairs, gaps], axis=1).reshape(-1, 2)
-    axis.plot(joined[:, 0], joined[:, 1], linewidth=0.6, **style)
+    axis.plot(joined[:, 0], joined[:, 1], linewidth=0.6, color=colour, linestyle=":", rasterized=True)
 
 
 def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:

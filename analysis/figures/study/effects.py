@@ -77,6 +77,7 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
         axis.tick_params(axis="y", right=False)
         low, high = min(-5.0, np.nanmin(parts) - 5.0), max(100.0, np.nanmax(parts))
         axis.set_xlim(low, high + _WORDS * (high - low))
+        axis.set_xticks([tick for tick in axis.get_xticks() if low <= tick <= high])  # none below the words
         axis.set_xlabel("share of the time of a run (%)")
         figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8, wrap=True)
     return figure
@@ -93,7 +94,8 @@ def _beside(dataset: xr.Dataset) -> list[str]:
             "displacement_range" in dataset
             and np.isfinite(ends := dataset["displacement_range"].values[row]).all()
         ):
-            lines.append(f"range {100.0 * (ends[1] / ends[0] - 1.0):+.3g} %" if ends[0] > 0.0 else "")
+            change = f"range {100.0 * (ends[1] / ends[0] - 1.0):+.3g} %" if ends[0] > 0.0 else ""
+            lines.append(change.replace("-", "\N{MINUS SIGN}"))
         found.append("\n".join(part for line in lines for part in wrap(line, _LONGEST)))
     return found
 

@@ -60,6 +60,26 @@ def test_turns_of_a_long_motion_are_layers_that_add_up(kind: str, tmp_path: Path
     assert many.axes[-1].get_xlim()[1] > 1.25  # all of it is in view
 
 
+def bouncing(turns: int) -> xr.Dataset:
+    """Return a run that meets its stop at 1 in each turn, 30 samples a turn."""
+    phase = 2.0 * np.pi * np.arange(30 * turns) / 30
+    rows = np.column_stack([phase, 1.0 - np.abs(np.sin(0.5 * phase)), -np.cos(0.5 * phase % np.pi)])
+    hits = record(0.0, impacts=turns - 1).impacts
+    assert hits is not None
+    hits[:, 0] = 2.0 * np.pi * np.arange(1, turns) - 0.01
+    run = RunRecord(Outcome.ok, "", None, hits, np.empty((0, 3)), rows, 0.0, 0.0, 0.0, 1e-3)
+    return dataset_of([run], coordinates={}, attrs={"scene": SCENE}, **NONDIMENSIONAL)
+
+
+@pytest.mark.parametrize(("turns", "are_joined"), [(12, True), (200, False)])
+def test_jumps_of_a_long_motion_are_gaps_not_a_solid_band(
+    turns: int, are_joined: bool, tmp_path: Path
+) -> None:
+    (axis,) = figures.draw(opened(bouncing(turns), tmp_path), "portrait").axes
+    assert bool([line for line in axis.lines if line.get_linestyle() == ":"]) is are_joined
+    assert len(axis.collections) == (0 if are_joined else 1)
+
+
 def test_impacts_on_two_stops_have_two_colours_in_a_diagram(tmp_path: Path) -> None:
     axis = figures.draw(opened(hits_of_two_stops(), tmp_path), "bifurcation").axes[1]
     drawn = {str(line.get_label()): line for line in axis.lines}
@@ -120,13 +140,14 @@ def test_what_effects_change_is_written_out(tmp_path: Path) -> None:
             "seconds": (("effect", "pair"), np.full((2, 3), 0.1)),
             "run_seconds": ("effect", np.ones(2)),
             "changes": ("effect", np.array([words, "nothing"], dtype=object)),
+            "displacement_range": (("effect", "end"), np.array([[1.0, 0.2], [np.nan, np.nan]])),
         },
         attrs={"results_kind": "effects"},
     )
     figure = figures.draw(dataset)
     (axis,) = figure.axes
     shown = {text.get_text().replace("\n", " "): text for text in axis.texts}
-    assert set(shown) == {words, "nothing"}
+    assert set(shown) == {f"{words} range \N{MINUS SIGN}80 %", "nothing"}
     assert all(text.get_fontsize() >= 6 for text in axis.texts)
     figure.draw_without_rendering()
     box = axis.get_window_extent()
@@ -134,6 +155,7 @@ def test_what_effects_change_is_written_out(tmp_path: Path) -> None:
     assert all(box.x0 < each.x0 and each.x1 <= box.x1 for each in extents)
     assert all(box.y0 < each.y0 and each.y1 < box.y1 for each in extents)
     assert extents[0].y0 > extents[1].y1  # no text is written over another
+    assert max(axis.get_xticks()) == 100.0 < axis.get_xlim()[1]  # no share is more than all
 
 
 def ticks(figure: figures.Figure) -> list[str]:
