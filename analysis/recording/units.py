@@ -6,6 +6,7 @@ what accelerometers are read in.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -39,7 +40,7 @@ _LONGEST_LABEL = 200
 """Characters of a label above which it is no unit: a product is read factor by factor, each as long as the rest."""
 _SUPERSCRIPTS = str.maketrans("¹²³⁻", "123-")
 _FACTOR = re.compile(
-    r"(?:(?P<number>\d{1,9}(?:\.\d{0,18})?(?:[eE][-+]?\d{1,2})?)|(?P<name>[A-Za-zµμΩ_%]{1,30}))"
+    r"(?:(?P<number>\d{1,16}(?:\.\d{0,18})?(?:[eE][-+]?\d{1,2})?)|(?P<name>[A-Za-zµμΩ_%]{1,30}))"
     r"(?:(?:\*\*|\^)?(?P<power>[-+]?[1-9]))?(?P<joint>\s*[*/·]\s*|\s+|$)"
 )
 
@@ -117,6 +118,9 @@ def measured_unit(label: str) -> MeasuredUnit:
         return MeasuredUnit(label, "degree_Celsius", "degree_Celsius", 1.0)
     try:
         base = _product(_LABELS.get(text, text)).to_base_units()
+        factor, si = float(base.magnitude), _si_name(base)
+        cf = si if factor == 1.0 else f"{factor:.15g} {si}"
+        _refuse_another(base, cf)
     except (
         pint.PintError,
         AssertionError,
@@ -126,8 +130,14 @@ def measured_unit(label: str) -> MeasuredUnit:
         ArithmeticError,
     ) as problem:
         raise _unknown(label) from problem
-    factor, si = float(base.magnitude), _si_name(base)
-    return MeasuredUnit(label, si if factor == 1.0 else f"{factor:.15g} {si}", si, factor)
+    return MeasuredUnit(label, cf, si, factor)
+
+
+def _refuse_another(base: Any, cf: str) -> None:
+    """Raise ValueError where a unit is not read again as what it is, as powers of ten and above, or of one half."""
+    again = _product(cf).to_base_units()
+    if again.units != base.units or not math.isclose(again.magnitude, base.magnitude, rel_tol=1e-12):
+        raise ValueError(cf)
 
 
 def _unknown(label: str) -> DatasetError:

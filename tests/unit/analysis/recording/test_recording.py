@@ -311,3 +311,19 @@ def test_a_text_of_thousands_of_factors_is_no_unit() -> None:
     with pytest.raises(DatasetError, match="expected a unit such as"):
         measured_unit("m " * 100_000)
     assert time.process_time() - started < 0.1
+
+
+@pytest.mark.parametrize(
+    "label", ["GHz", "GPa", "TPa", "MN/m^2", "PHz", "eV", "nF", "rpm", "°/s", "l/min", "m5 s-9", "byte"]
+)
+def test_a_unit_that_is_written_is_read_again(label: str) -> None:
+    unit = measured_unit(label)
+    again = measured_unit(unit.cf)
+    assert (again.cf, again.si) == (unit.cf, unit.si)
+    assert again.factor == pytest.approx(unit.factor, rel=1e-14)
+
+
+@pytest.mark.parametrize("label", ["m m m m m m m m m m", "gauss", "s-5 s-5"])
+def test_a_unit_that_could_not_be_read_again_is_refused(label: str) -> None:
+    with pytest.raises(DatasetError, match="expected a unit such as"):
+        measured_unit(label)
