@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "instance.h"
+#include "saved_states.h"
 
 #define UNUSED(argument) (void)(argument)
 

@@ -1,4 +1,4 @@
-/* What the FMI 3.0 and the FMI 2.0 adapter share: an instance, its mode, its variables, its saved states. */
+/* What the FMI 3.0 and the FMI 2.0 adapter share: an instance, its mode, its variables. */
 #ifndef VIBROIMPACT_INSTANCE_H
 #define VIBROIMPACT_INSTANCE_H
 
@@ -105,18 +105,5 @@ bool vi_instance_get(vi_instance *instance, const char *function, int type, cons
                      void *values, size_t value_count, vi_convert convert);
 bool vi_instance_set(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      const void *values, size_t value_count, vi_convert convert);
-
-/* ---- saved states ---- */
-
-typedef struct vi_saved vi_saved;
-
-/* Save into *saved (reused when large enough, else allocated); false when memory is out. */
-bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved);
-bool vi_instance_restore(vi_instance *instance, const char *function, const vi_saved *saved);
-size_t vi_saved_size(const vi_saved *saved);
-void vi_saved_write(const vi_saved *saved, unsigned char *bytes);
-/* A state from bytes; NULL (after logging) when they are not a state of this component. */
-vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size);
-void vi_saved_free(vi_saved *saved);
 
 #endif

@@ -1,0 +1,130 @@
+#include "saved_states.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A saved state: this header, then the used part of the component's struct. */
+struct vi_saved {
+    char magic[8];
+    uint64_t token_hash, state_hash;
+    uint64_t size, capacity; /* of the data, bytes */
+    int64_t mode, exchange;
+    double start_time;
+    int64_t outputs_stale;
+    unsigned char data[];
+};
+
+static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '1'};
+
+static const uint64_t HASH_START = 1469598103934665603u;
+
+/* FNV-1a: tells a damaged or foreign state from a good one; not a defence against forgery. */
+static uint64_t hash(uint64_t h, const void *data, size_t size)
+{
+    const unsigned char *bytes = data;
+    for (size_t i = 0; i < size; ++i) {
+        h = (h ^ bytes[i]) * 1099511628211u;
+    }
+    return h;
+}
+
+static uint64_t token_hash(void)
+{
+    return hash(HASH_START, vi_this_component.token, strlen(vi_this_component.token));
+}
+
+/* Of all that a state says: the header from `size` on, and the data. */
+static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
+{
+    const size_t first = offsetof(vi_saved, size);
+    const uint64_t h = hash(HASH_START, (const unsigned char *)header + first, sizeof(vi_saved) - first);
+    return hash(h, data, header->size);
+}
+
+bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved)
+{
+    const size_t size = vi_this_component.used_size(instance->self);
+    vi_saved *state = *saved;
+    if (state == NULL || state->capacity < size) {
+        state = realloc(state, sizeof(vi_saved) + size);
+        if (state == NULL) {
+            return vi_instance_fail(instance, function, "out of memory");
+        }
+        memset(state, 0, sizeof(vi_saved));
+        state->capacity = size;
+    }
+    memcpy(state->magic, MAGIC, sizeof MAGIC);
+    state->size = size;
+    state->mode = (int64_t)instance->mode;
+    state->exchange = instance->exchange;
+    state->start_time = instance->start_time;
+    state->outputs_stale = instance->outputs_stale;
+    memcpy(state->data, instance->self, size);
+    *saved = state;
+    return true;
+}
+
+bool vi_instance_restore(vi_instance *instance, const char *function, const vi_saved *saved)
+{
+    if (saved == NULL || saved->size > vi_this_component.struct_size) {
+        return vi_instance_fail(instance, function, "expected a saved state, got none");
+    }
+    if (vi_this_component.attach != NULL && saved->size != vi_this_component.used_size(instance->self)) {
+        return vi_instance_fail(instance, function, "expected a state that fits the FMU's resources, got one of others");
+    }
+    if ((saved->exchange != 0) != instance->exchange) {
+        return vi_instance_fail(instance, function, "expected a state of an instance of %s, got one of %s",
+                                instance->exchange ? "model exchange" : "co-simulation",
+                                instance->exchange ? "co-simulation" : "model exchange");
+    }
+    memcpy(instance->self, saved->data, saved->size);
+    instance->mode = (vi_mode_of_use)saved->mode;
+    instance->start_time = saved->start_time;
+    instance->outputs_stale = saved->outputs_stale != 0;
+    return true;
+}
+
+size_t vi_saved_size(const vi_saved *saved)
+{
+    return sizeof(vi_saved) + saved->size;
+}
+
+void vi_saved_write(const vi_saved *saved, unsigned char *bytes)
+{
+    vi_saved header = *saved;
+    header.token_hash = token_hash();
+    header.capacity = saved->size;
+    header.state_hash = state_hash(&header, saved->data);
+    memcpy(bytes, &header, sizeof header);
+    memcpy(bytes + sizeof header, saved->data, saved->size);
+}
+
+vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size)
+{
+    vi_saved header;
+    if (size < sizeof header) {
+        vi_instance_fail(instance, function, "expected a serialized state, got %lu bytes", (unsigned long)size);
+        return NULL;
+    }
+    memcpy(&header, bytes, sizeof header);
+    const unsigned char *data = bytes + sizeof header;
+    if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0 || header.token_hash != token_hash()
+        || header.size != size - sizeof header || header.size > vi_this_component.struct_size
+        || header.state_hash != state_hash(&header, data)) {
+        vi_instance_fail(instance, function, "these bytes are not an undamaged state of this component and version");
+        return NULL;
+    }
+    vi_saved *saved = malloc(size);
+    if (saved == NULL) {
+        vi_instance_fail(instance, function, "out of memory");
+        return NULL;
+    }
+    memcpy(saved, bytes, size);
+    saved->capacity = header.size;
+    return saved;
+}
+
+void vi_saved_free(vi_saved *saved)
+{
+    free(saved);
+}
