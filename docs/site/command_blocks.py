@@ -1,4 +1,4 @@
-"""Blocks of commands wrap on the site; tables that a command prints keep their lines, and scroll sideways."""
+"""Blocks of commands and of sentences wrap on the site; tables that a command prints keep their lines, and scroll."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ import re
 from typing import Any
 
 CLASS = "commands"
-"""Of blocks that hold commands alone; `static/site.css` wraps them."""
+"""Of blocks that hold commands or sentences alone; `static/site.css` wraps them."""
+PRINTED = "printed"
+"""Of all other blocks without a language, such as tables; `static/site.css` writes them small."""
+_NO_LANGUAGE = ("", "none", "default", "text")
+# Two blanks within a line, or a ruled line, stand between columns; an indented line hangs below another.
+_COLUMN = re.compile(r"\S {2,}\S|[─│]|^\s")
 # A command begins a line; the lines that continue it are indented, or the line before them ends with a backslash.
 _COMMAND = re.compile(r"(vibroimpact|pip|pip3|python|make|git|pytest|docker|curl|cd|export) \S")
 
@@ -34,9 +39,24 @@ def is_commands(text: str) -> bool:
     return bool(lines)
 
 
+def is_sentences(text: str) -> bool:
+    """Return whether a block holds messages alone, each of which is a line without columns.
+
+    Examples
+    --------
+    >>> is_sentences("a.toml: mass: expected a number.\\nAdd one."), is_sentences("run  impacts\\n  0       20")
+    (True, False)
+    """
+    lines = [line for line in text.splitlines() if line]
+    return bool(lines) and not any(map(_COLUMN.search, lines))
+
+
 def _mark(sphinx: Any, doctree: Any) -> None:
     from docutils import nodes
 
     for block in doctree.findall(nodes.literal_block):
-        if is_commands(block.astext()):
+        text = block.astext()
+        if is_commands(text):
             block["classes"].append(CLASS)
+        elif block.get("language", "none") in _NO_LANGUAGE:
+            block["classes"].append(CLASS if is_sentences(text) else PRINTED)

@@ -6,7 +6,7 @@ import ast
 import re
 
 import pytest
-from command_blocks import CLASS, is_commands
+from command_blocks import CLASS, PRINTED, is_commands, is_sentences
 from support.places import ROOT
 
 DOCS, SITE = ROOT / "docs", ROOT / "docs" / "site"
@@ -50,6 +50,21 @@ def test_blocks_of_commands_alone_wrap(text: str, expected: bool) -> None:
     assert is_commands(text) is expected
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("beam.toml: stop[1].restitution: expected 0 <= r <= 1, got 1.2. Use 1 for an elastic stop.\n", True),
+        ("1 run in 0.1 s\n\nDataset written to a.nc.\n", True),
+        ("  r    estimate\n", False),
+        ("P(1,1)   unstable   0.93\n", False),
+        ("───────\n", False),
+        ("\n", False),
+    ],
+)
+def test_sentences_wrap_and_columns_do_not(text: str, expected: bool) -> None:
+    assert is_sentences(text) is expected
+
+
 def test_tables_of_the_pages_of_orbits_keep_their_lines() -> None:
     blocks = re.findall(r"```\n(.*?)```", (DOCS / "orbits.md").read_text(encoding="utf-8"), re.S)
     printed = [block for block in blocks if not is_commands(block)]
@@ -63,3 +78,4 @@ def test_tables_of_the_pages_of_orbits_keep_their_lines() -> None:
     }
     assert "white-space: pre;" in rules[".bd-article pre"]
     assert "white-space: pre-wrap;" in rules[f".bd-article .{CLASS} pre"]
+    assert "font-size" in rules[f".bd-article .{PRINTED} pre"]
