@@ -8,21 +8,10 @@ from pathlib import Path
 import pytest
 from support import fmu_factory
 from support.command_line import in_this_process
-from support.fmu_factory import redescribed
+from support.fmu_factory import GAIN_SCENE, redescribed
 
 from vibroimpact.analysis.dataset import read_flat
 
-SCENE = """
-[component.g]
-fmu = "g.fmu"
-parameters = { k = 3.0, u = 2.0 }
-[record]
-recorded_time = 1.0
-rate = 10
-variables = ["g.y"]
-[execution]
-guard = false
-"""
 ROOT = '<fmiModelDescription fmiVersion="2.0"'
 EXPERIMENT = '<DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>'
 ANNOTATIONS = (
@@ -83,7 +72,7 @@ FAULTS = {
 def commands_take(folder: Path, remark: str, *, by_loading: bool = False) -> None:
     """Run, check and `fmu check` the FMU of a folder strictly; each has to take it, with its remark and its numbers."""
     scene, fmu = folder / "s.toml", folder / "g.fmu"
-    scene.write_text(SCENE)
+    scene.write_text(GAIN_SCENE)
     done = in_this_process("run", scene, "-o", folder / "r.nc", "--strict")
     assert done.returncode == 0, done.stderr
     told = "note: g.fmu: 1 remark on its description" in done.stderr
@@ -116,7 +105,7 @@ def test_an_fmu_of_another_token_is_refused_by_every_command_with_one_exit_code(
 ) -> None:
     redescribed(fmu_factory.gain(tmp_path), tmp_path / "g.fmu", ('guid="{', 'guid="{another '))
     scene, dataset = tmp_path / "s.toml", tmp_path / "r.nc"
-    scene.write_text(SCENE.replace("guard = false", f"guard = {guard}"))
+    scene.write_text(GAIN_SCENE.replace("guard = false", f"guard = {guard}"))
     for command in (("run", scene, "-o", dataset), ("check", scene), ("fmu", "check", tmp_path / "g.fmu")):
         refused = in_this_process(*command)
         assert refused.returncode == 2, refused.stderr

@@ -7,21 +7,10 @@ from pathlib import Path
 import pytest
 from support import fmu_factory
 from support.command_line import in_this_process
-from support.fmu_factory import redescribed
+from support.fmu_factory import GAIN_SCENE, redescribed
 
 from vibroimpact.analysis.dataset import read_flat
 
-SCENE = """
-[component.g]
-fmu = "g.fmu"
-parameters = { k = 3.0, u = 2.0 }
-[record]
-recorded_time = 1.0
-rate = 10
-variables = ["g.y"]
-[execution]
-guard = false
-"""
 REMARK = ('causality="parameter" variability="tunable" initial="exact"', 'causality="parameter"')
 DOUBT = ('<Unknown index="2" dependencies="1"/>', '<Unknown index="2" dependencies="7"/>')
 REFUSED = ('name="b"', 'name="k"')
@@ -29,7 +18,7 @@ REFUSED = ('name="b"', 'name="k"')
 
 def scene_with(folder: Path, *changes: tuple[str, str]) -> Path:
     redescribed(fmu_factory.gain(folder), folder / "g.fmu", *changes)
-    (folder / "s.toml").write_text(SCENE)
+    (folder / "s.toml").write_text(GAIN_SCENE)
     return folder / "s.toml"
 
 
@@ -77,7 +66,7 @@ def test_an_fmu_for_model_exchange_alone_is_one_problem(tmp_path: Path) -> None:
     changes = (('<CoSimulation modelIdentifier="Gain" canHandleVariableCommunicationStepSize="true"/>',
                 '<ModelExchange modelIdentifier="Gain"/>'),)  # fmt: skip
     scene = scene_with(tmp_path, *changes)
-    scene.write_text(SCENE.replace("g.y", "g.no_such"))
+    scene.write_text(GAIN_SCENE.replace("g.y", "g.no_such"))
     refused = in_this_process("check", scene)
     assert refused.returncode == 2
     (line,) = refused.stderr.strip().splitlines()

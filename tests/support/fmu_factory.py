@@ -39,6 +39,19 @@ MADE = tuple(
     (name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (SOURCES / f"{name}.fmi{fmi[0]}.xml").exists()
 )
 
+GAIN_SCENE = """
+[component.g]
+fmu = "g.fmu"
+parameters = { k = 3.0, u = 2.0 }
+[record]
+recorded_time = 1.0
+rate = 10
+variables = ["g.y"]
+[execution]
+guard = false
+"""
+"""A scene of the FMU `g.fmu` that `gain` makes, for its output `y`."""
+
 
 def bouncing_ball(folder: Path, fmi: str = "2.0") -> Path:
     """Write a ball that looks for the ground only where a step ends: has state, but no events.
