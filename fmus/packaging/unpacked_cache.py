@@ -14,6 +14,7 @@ import secrets
 import shutil
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,7 +27,12 @@ MOST_AGE = 30 * 86400.0
 """Time since a process began to use an FMU, s, above which its unpacked copy goes; it is unpacked again when needed."""
 UNPACKING = ".unpacking-"
 """How the names of folders begin that are being filled, or removed."""
+SIZES = "sizes"
+"""File of the cache: a line `folder bytes` for each folder whose files were counted, so that each is counted once."""
 _ENTRY = re.compile(r"[0-9a-f]{64}")
+_SIZE = re.compile(r"\d{1,15}", re.ASCII)
+_MOST_GONE = 100
+"""Lines of folders that are gone which the file of sizes may have in any case."""
 _MOST_TRIES, _PAUSE = 500, 0.01
 """Tries, and s between two, to lock a folder that another process sweeps: it renames it at once."""
 
@@ -126,6 +132,8 @@ def sweep(cache: Path, coming: int, abandoned_after: float) -> None:
         Age, s, above which a folder that is half unpacked and not locked is nobody's.
     """
     now, total, entries = time.time(), coming, []
+    known = _known_sizes(cache)
+    sizes: dict[str, int] = {}
     for folder in cache.iterdir():
         with suppress(FileNotFoundError):
             used = folder.lstat().st_mtime
@@ -133,11 +141,34 @@ def sweep(cache: Path, coming: int, abandoned_after: float) -> None:
                 if now - used > abandoned_after:
                     _remove_unused(folder)
             elif _ENTRY.fullmatch(folder.name):
-                entries.append((used, _size(folder), folder))
-                total += entries[-1][1]
+                size = known[folder.name] if folder.name in known else _size(folder)
+                sizes[folder.name] = size
+                entries.append((used, size, folder))
+                total += size
+    _keep_sizes(cache, known, sizes)
     for used, size, folder in sorted(entries):
         if (now - used > MOST_AGE or total > MOST_BYTES) and _remove_unused(folder):
             total -= size
+
+
+def _known_sizes(cache: Path) -> dict[str, int]:
+    """Return the bytes of each folder that an earlier sweep has counted; a line that says nothing is passed over."""
+    try:
+        lines = (cache / SIZES).read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return {}
+    pairs = (line.partition(" ") for line in lines)
+    return {name: int(size) for name, _, size in pairs if _ENTRY.fullmatch(name) and _SIZE.fullmatch(size)}
+
+
+def _keep_sizes(cache: Path, known: Mapping[str, int], sizes: Mapping[str, int]) -> None:
+    """Keep sizes for the next sweep: new ones at the end, all anew where most are gone. Lost ones are counted again."""
+    new = {name: size for name, size in sizes.items() if name not in known}
+    forgets = len(known) > 2 * len(sizes) + _MOST_GONE
+    text = "".join(f"{name} {size}\n" for name, size in (sizes if forgets else new).items())
+    if text:
+        with suppress(OSError), (cache / SIZES).open("w" if forgets else "a", encoding="ascii") as file:
+            file.write(text)
 
 
 def _size(folder: Path) -> int:
