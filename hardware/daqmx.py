@@ -9,18 +9,20 @@ import os
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.surroundings import in_a_folder_that_exists
 
 # what gRPC logs by itself stands beside the one line that this package says of it
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 try:
-    import grpc
-    import nidaqmx
-    from nidaqmx import constants, stream_readers, stream_writers
-    from nidaqmx._stubs import nidaqmx_pb2
-    from nidaqmx.error_codes import DAQmxErrors, DAQmxWarnings
-    from nidaqmx.errors import DaqError, DaqNotFoundError, RpcError
-    from nidaqmx.system import System
+    with in_a_folder_that_exists():  # nidaqmx looks for a file of settings in the current one
+        import grpc
+        import nidaqmx
+        from nidaqmx import constants, stream_readers, stream_writers
+        from nidaqmx._stubs import nidaqmx_pb2
+        from nidaqmx.error_codes import DAQmxErrors, DAQmxWarnings
+        from nidaqmx.errors import DaqError, DaqNotFoundError, RpcError
+        from nidaqmx.system import System
 except ImportError as _missing:
     raise UsageError(
         f"rig: expected the package nidaqmx with gRPC, got none ({_missing}). "

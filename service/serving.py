@@ -16,6 +16,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.unpacked_cache import hold_at_most
+from vibroimpact.fmus.surroundings import refuse_no_loopback
 from vibroimpact.fmus.terminal import say
 from vibroimpact.fmus.wording import option
 from vibroimpact.service.api import application
@@ -56,9 +57,11 @@ def serve(
     Raises
     ------
     UsageError
-        The folder or the port is taken, or the address is not of this machine alone and nobody allowed that.
+        The folder or the port is taken, the address is not of this machine alone and nobody allowed that, or nothing
+        is reached over loopback.
     """
     _refuse_remote(host, allow_remote)
+    refuse_no_loopback("the service and its jobs are reached")
     hosts = Hosts(host, names)
     _make_own(folder)
     with locked_folder(folder, "service"):

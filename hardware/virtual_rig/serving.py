@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.surroundings import refuse_few_descriptors, refuse_no_loopback
 from vibroimpact.hardware.daqmx import CHANNEL_OPTIONS, METHODS, SERVICE, DAQmxErrors, grpc, message_class
 from vibroimpact.hardware.virtual_rig import control
 from vibroimpact.hardware.virtual_rig.board import Board
@@ -18,6 +19,8 @@ from vibroimpact.hardware.virtual_rig.refusal import Refusal
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
 
 HOST = "127.0.0.1"
+DESCRIPTORS = 16
+"""Descriptors that the server and one program on it open: 12 measured on Linux."""
 THREADS = 64
 """Each event that a program listens to holds one."""
 
@@ -40,10 +43,12 @@ class RigServer:
     Raises
     ------
     SceneError, UsageError
-        The plant is none, or the port is taken.
+        The plant is none, the port is taken, or this machine lacks what a rig needs.
     """
 
     def __init__(self, settings: RigSettings, port: int = 0) -> None:
+        refuse_few_descriptors(DESCRIPTORS, "a virtual rig")
+        refuse_no_loopback("a virtual rig is reached")
         self._server = grpc.server(
             futures.ThreadPoolExecutor(THREADS, thread_name_prefix="rig"),
             options=[*CHANNEL_OPTIONS, ("grpc.so_reuseport", 0)],

@@ -26,17 +26,18 @@ from distributed.utils import get_mp_context
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import no_library_warns, safe_module_path
+from vibroimpact.fmus.surroundings import (
+    LOOPBACK,
+    leave_removed_folder,
+    refuse_few_descriptors,
+    refuse_no_loopback,
+)
 from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.campaign.progress import Progress
-from vibroimpact.orchestrator.campaign.surroundings import (
-    LOOPBACK,
-    leave_removed_folder,
-    refuse_poor_surroundings,
-)
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""
@@ -70,6 +71,12 @@ QUIET: dict[str, Any] = {
     "logging": {"distributed": "critical"},
 }
 """Settings of Dask that switch off or slow down what it does beside the work."""
+
+OWN_DESCRIPTORS = 32
+"""Descriptors that a campaign opens for itself and Dask's scheduler: 18 measured on Linux, with 1 and 2 workers."""
+
+WORKER_DESCRIPTORS = 12
+"""Descriptors that a campaign opens for each of its workers: 11 measured on Linux, with 1 and 2 workers."""
 
 LONGEST_TEMPORARY = 75
 """Bytes of the path of a temporary folder beyond which no socket in it has a name: Linux takes 107."""
@@ -106,7 +113,7 @@ def open_workers(
         warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         if scheduler is None:
             number = workers or processor_count()
-            refuse_poor_surroundings(number)
+            _refuse_poor_surroundings(number)
             stack.enter_context(safe_module_path())
             stack.enter_context(no_library_warns())
             scratch = stack.enter_context(ScratchFolder("workers"))
@@ -268,6 +275,15 @@ def _own_certificates(folder: Path) -> Security:
     names = {f"tls_{role}_cert": str(certificate) for role in ("client", "scheduler", "worker")}
     names |= {f"tls_{role}_key": str(key) for role in ("client", "scheduler", "worker")}
     return Security(require_encryption=True, tls_ca_file=str(certificate), **names)
+
+
+def _refuse_poor_surroundings(workers: int) -> None:
+    """Raise UsageError where workers of this machine cannot be started or reached."""
+    fewer = f"ask for fewer workers with {option('workers')}" if workers > 1 else ""
+    whose = f"{workers} worker{'s' if workers > 1 else ''}"
+    refuse_few_descriptors(OWN_DESCRIPTORS + workers * WORKER_DESCRIPTORS, whose, fewer)
+    instead = f"use {typed_or_called('`vibroimpact run`', 'vi.run')}, which needs none"
+    refuse_no_loopback("workers are reached", instead)
 
 
 def _replace_dead_workers(cluster: LocalCluster, workers: int, scratch: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.python_child import ending, no_library_warns, safe_module_path
-from vibroimpact.orchestrator.campaign.surroundings import leave_removed_folder
+from vibroimpact.fmus.surroundings import leave_removed_folder
 
 POLL_SECONDS = 0.5
 """How often the waiting process looks up, s."""
@@ -43,26 +43,23 @@ def call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_answer, args=(sender, function, arguments), daemon=True)
-    with (
-        safe_module_path(),
-        no_library_warns(),
-        ScratchFolder("current-folder") as scratch,
-        interrupts_blocked(),
-    ):
-        leave_removed_folder(Path(scratch.name))
-        process.start()
-    sender.close()
-    try:
-        while not receiver.poll(POLL_SECONDS):
-            continue
-        result, error = receiver.recv()
-    except EOFError:
-        process.join()
-        raise ProcessDied(f"it {ending(process.exitcode)}") from None
-    finally:
-        process.kill()
-        process.join()
-        receiver.close()
+    # the process goes to the current folder of this one, which is there until it ends
+    with ScratchFolder("current-folder") as scratch:
+        with safe_module_path(), no_library_warns(), interrupts_blocked():
+            leave_removed_folder(Path(scratch.name))
+            process.start()
+        sender.close()
+        try:
+            while not receiver.poll(POLL_SECONDS):
+                continue
+            result, error = receiver.recv()
+        except EOFError:
+            process.join()
+            raise ProcessDied(f"it {ending(process.exitcode)}") from None
+        finally:
+            process.kill()
+            process.join()
+            receiver.close()
     if error is not None:
         raise error
     return result

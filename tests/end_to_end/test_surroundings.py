@@ -13,7 +13,7 @@ import pytest
 from support.command_line import in_this_process
 from support.places import EXAMPLES
 
-from vibroimpact.orchestrator.campaign import surroundings
+from vibroimpact.fmus import surroundings
 from vibroimpact.orchestrator.commands import cli
 
 resource = pytest.importorskip("resource")
@@ -74,15 +74,68 @@ def test_a_campaign_with_few_descriptors_says_so_before_it_starts_a_worker(tmp_p
     assert line.endswith("Raise the limit (`ulimit -n 1024`), or ask for fewer workers with --workers.")
 
 
-def test_a_campaign_without_loopback_says_so_before_it_starts_a_worker(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+RIG = EXAMPLES / "rig" / "oscillator.toml"
+
+
+def recording_of_a_rig(target: Path) -> tuple[str | Path, ...]:
+    inputs = ("--channel", "tip=Dev1/ai0,5", "--rate", "5000", "--duration", "0.1")
+    return "rig", "record", "--rig", f"virtual:{RIG}", *inputs, "-o", target
+
+
+@pytest.mark.parametrize(
+    ("words", "purpose"),
+    [
+        (("campaign", SCENE, "--workers", "1", "-o", "out"), "workers are reached"),
+        (("serve", "--data", "service"), "the service and its jobs are reached"),
+        (("rig", "serve", RIG, "--port", "0"), "a virtual rig is reached"),
+        (recording_of_a_rig(Path("record.nc")), "a virtual rig is reached"),
+    ],
+    ids=["campaign", "serve", "rig serve", "rig record"],
+)
+def test_what_needs_loopback_says_so_before_it_starts_anything(
+    words: tuple[str | Path, ...], purpose: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # an address of the documentation (RFC 5737) is no address of any machine
     monkeypatch.setattr(surroundings, "LOOPBACK", "192.0.2.1")
-    done = in_this_process("campaign", SCENE, "-o", tmp_path / "out", "--workers", "1")
+    monkeypatch.chdir(tmp_path)
+    done = in_this_process(*words)
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2
-    assert line.startswith("this machine: expected 192.0.2.1 to answer, over which workers are reached, got ")
+    assert line.startswith(f"this machine: expected 192.0.2.1 to answer, over which {purpose}, got ")
+
+
+def test_a_virtual_rig_with_few_descriptors_says_so(tmp_path: Path) -> None:
+    """gRPC said "Error in service handler!" of 12 descriptors, and aborted with 6."""
+    done = command(
+        *recording_of_a_rig(tmp_path / "record.nc"),
+        before=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (12, 12)),
+    )
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2
+    assert line.startswith("this machine: expected 16 files that may be opened for a virtual rig, got ")
+
+
+def test_a_rig_records_to_an_absolute_path_without_a_current_folder(
+    removed: Callable[[], None], tmp_path: Path
+) -> None:
+    done = command(*recording_of_a_rig(tmp_path / "record.nc"), before=removed)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+
+
+def test_a_process_of_its_own_finds_the_folder_that_it_is_started_in(removed: Callable[[], None]) -> None:
+    """`accuracy` showed a traceback: the folder was gone before the process that measures memory came to it."""
+    program = (
+        "from vibroimpact.orchestrator.campaign.lone_process import call_alone; print(call_alone(abs, -3))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program],
+        preexec_fn=removed,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "3\n", "")
 
 
 def test_a_campaign_that_a_signal_ends_leaves_no_line_of_the_resource_tracker(tmp_path: Path) -> None:

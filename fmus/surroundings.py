@@ -1,0 +1,107 @@
+"""What this machine must have for processes that talk to each other: a current folder, loopback, and descriptors.
+
+Libraries meet a lack of them in threads of their own: it shows as tracebacks, an abort, or an answer that never comes.
+So all three are looked at before.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from vibroimpact.fmus.errors import UsageError
+
+LOOPBACK = "127.0.0.1"
+"""Address of this machine itself, over which processes of one campaign, rig or service talk."""
+
+REACH_SECONDS = 5.0
+"""How long a connection over loopback may take, s; one takes less than a millisecond."""
+
+
+def leave_removed_folder(instead: Path) -> None:
+    """Make `instead` the current folder where that was removed: multiprocessing asks for its path."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        os.chdir(instead)
+
+
+@contextmanager
+def in_a_folder_that_exists() -> Iterator[None]:
+    """Let a library be imported that asks for the current folder, also where that was removed."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        removed = os.open(".", os.O_RDONLY)
+    else:
+        yield
+        return
+    try:
+        os.chdir(os.sep)
+        yield
+    finally:
+        os.fchdir(removed)
+        os.close(removed)
+
+
+def refuse_few_descriptors(needed: int, whose: str, fewer: str = "") -> None:
+    """Raise UsageError where this process may not open so many more files.
+
+    Parameters
+    ----------
+    needed : int
+    whose : str
+        Who needs them: `2 workers`.
+    fewer : str
+        What else may be done, after `, or`.
+    """
+    available = _available_descriptors(needed)
+    if available < needed:
+        other = f", or {fewer}" if fewer else ""
+        raise UsageError(
+            f"this machine: expected {needed} files that may be opened for {whose}, got {available}. "
+            f"Raise the limit (`ulimit -n 1024`){other}."
+        )
+
+
+def _available_descriptors(most: int) -> int:
+    """Return how many more files this process may open now, `most` at most."""
+    held: list[int] = []
+    try:
+        while len(held) < most:
+            held.append(os.open(os.devnull, os.O_RDONLY))
+    except OSError as error:
+        if error.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+    finally:
+        for one in held:
+            os.close(one)
+    return len(held)
+
+
+def refuse_no_loopback(purpose: str, instead: str = "") -> None:
+    """Raise UsageError where nothing is reached over loopback.
+
+    Parameters
+    ----------
+    purpose : str
+        What is, after `over which`: `workers are reached`.
+    instead : str
+        What else may be done, after `, or`.
+    """
+    try:
+        with (
+            socket.create_server((LOOPBACK, 0)) as listener,
+            socket.create_connection(listener.getsockname()[:2], timeout=REACH_SECONDS),
+        ):
+            return
+    except OSError as error:
+        other = f", or {instead}" if instead else ""
+        raise UsageError(
+            f"this machine: expected {LOOPBACK} to answer, over which {purpose}, got {error.strerror or error}. "
+            f"Set up the network interface of this machine itself (`ip link set lo up`){other}."
+        ) from error
