@@ -1,0 +1,126 @@
+"""The process in which files of strangers are read: whatever damaged bytes do to the libraries, they do it here.
+
+Run by `reader_process`, as a file. Each line of standard input is an order, a JSON object. The answer is a line of
+JSON: {"verdict": "read" | "raised" | "late" | "died", ...}, for "read" with the sizes of the buffers whose bytes
+follow. Each file is read in a process of its own, made by `fork` from this one, in which the libraries are imported
+already, and which `confinement` limits. Nothing is pickled.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+import os
+import select
+import signal
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from vibroimpact.fmus.confinement import confine
+
+#: After this time without a file to read this process ends, s.
+IDLE = 30.0
+LONGEST_TEXT = 20_000
+_LATE = frozenset(
+    getattr(signal, name) for name in ("SIGALRM", "SIGPROF", "SIGXCPU") if hasattr(signal, name)
+)
+
+Message = tuple[bytes, Sequence[Any]]
+
+
+def read_here(order: dict[str, Any]) -> Message:
+    """Read the file of an order in this process; return the line that answers and its buffers."""
+    try:
+        module, _, function = order["reader"].partition(":")
+        facts, buffers = getattr(importlib.import_module(module), function)(order["path"], order["options"])
+        views = [memoryview(buffer).cast("B") for buffer in buffers]
+        found = {"verdict": "read", "facts": facts, "sizes": [view.nbytes for view in views]}
+        return _line(found), views
+    # whatever it is, it is what the file does to its reader
+    except BaseException as error:
+        return _line(_raised(error)), ()
+
+
+def _raised(error: BaseException) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "verdict": "raised",
+        "error": type(error).__name__,
+        "text": str(error)[:LONGEST_TEXT],
+    }
+    if isinstance(error, OSError):
+        found |= {"system": True, "errno": error.errno, "reason": error.strerror or str(error)[:LONGEST_TEXT]}
+    return found
+
+
+def _line(found: dict[str, Any]) -> bytes:
+    return json.dumps(found).encode() + b"\n"
+
+
+def _send(answers: int, message: Message) -> None:
+    line, buffers = message
+    for part in (line, *buffers):
+        rest = memoryview(part)
+        while rest:
+            rest = rest[os.write(answers, rest) :]
+
+
+def read_in_fork(order: dict[str, Any], answers: int) -> None:
+    """Let a process of its own read the file of an order, and answer; say how it ended where it does not."""
+    has_begun, begins = os.pipe()
+    process = os.fork()
+    if process == 0:
+        os.close(has_begun)
+        _read_and_end(order, begins, answers)
+    os.close(begins)
+    with os.fdopen(has_begun, "rb") as pipe:
+        # standard input speaks only when nobody waits for this answer any more
+        if select.select([0, pipe.fileno()], [], [])[0] == [0]:
+            os.kill(process, signal.SIGKILL)
+        answered = pipe.read()
+    _, status = os.waitpid(process, 0)
+    if status and answered:
+        os._exit(1)  # within its answer, which nobody can read on from
+    if not answered:
+        ended_by = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+        verdict = "late" if ended_by in _LATE else "died"
+        _send(answers, (_line({"verdict": verdict, "error": str(ended_by or "")}), ()))
+
+
+def _read_and_end(order: dict[str, Any], begins: int, answers: int) -> NoReturn:
+    """Read a file, answer, and end this process."""
+    code = 1
+    try:
+        confine(order["seconds"], order["memory"])
+        message = read_here(order)
+        for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # whoever takes the answer may be slow
+            signal.setitimer(timer, 0.0)
+        os.write(begins, b"1")
+        _send(answers, message)
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def main() -> None:
+    """Answer orders until standard input ends, or none has come for a while."""
+    answers = os.dup(1)
+    os.dup2(2, 1)  # what a library prints is no answer
+    forks = hasattr(os, "fork")
+    while not forks or select.select([0], [], [], IDLE)[0]:
+        line = sys.stdin.buffer.readline()
+        if not line:
+            return
+        order = json.loads(line)
+        for name in (*order["libraries"], order["reader"].partition(":")[0]):
+            with contextlib.suppress(ImportError):  # the reader says what is not installed
+                importlib.import_module(name)
+        if forks:
+            read_in_fork(order, answers)
+        else:
+            _send(answers, read_here(order))
+
+
+if __name__ == "__main__":
+    main()
