@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import tomllib
 from functools import cache
 from importlib.resources import files
@@ -46,6 +47,17 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
             f"{path}: expected a built FMU, got none. Run `python -m vibroimpact.fmus.packaging.build`."
         )
     return path
+
+
+def is_shipped(file_name: str, digest: str) -> bool:
+    """Return whether a content, by its SHA-256, is that of an FMU of the package with this file name."""
+    for folder in FOLDERS.values():
+        path = package_folder() / "built" / folder / file_name
+        if path.is_file():
+            with path.open("rb") as file:
+                if hashlib.file_digest(file, "sha256").hexdigest() == digest:
+                    return True
+    return False
 
 
 def component_name(name: str) -> str:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from vibroimpact.analysis.recording.arrays import array_of, channel_of
-from vibroimpact.analysis.recording.channels import (
-    Channel,
-    EventTrain,
-    Quality,
-    Recording,
-    SingleValue,
-    TimeAxis,
-)
-from vibroimpact.analysis.recording.files import is_recording, open_recording, open_signals, write_recording
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibroimpact.analysis.recording.arrays import array_of, channel_of
+    from vibroimpact.analysis.recording.channels import (
+        Channel,
+        EventTrain,
+        Quality,
+        Recording,
+        SingleValue,
+        TimeAxis,
+    )
+    from vibroimpact.analysis.recording.files import (
+        is_recording,
+        open_recording,
+        open_signals,
+        write_recording,
+    )
 
 __all__ = [
     "Channel",
@@ -27,3 +36,17 @@ __all__ = [
     "open_signals",
     "write_recording",
 ]
+
+_MODULES = {
+    **dict.fromkeys(("array_of", "channel_of"), "arrays"),
+    **dict.fromkeys(("is_recording", "open_recording", "open_signals", "write_recording"), "files"),
+}
+"""Modules of what is not in `channels`."""
+
+
+def __getattr__(name: str) -> Any:
+    # The readers of formats come through this door for units alone, and xarray takes half a second to load.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = importlib.import_module(f"{__name__}.{_MODULES.get(name, 'channels')}")
+    return getattr(module, name)

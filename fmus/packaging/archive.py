@@ -7,6 +7,7 @@ outside its folder, fill the disk, or expand entities. Everything here raises `C
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import stat
 import tempfile
@@ -23,6 +24,7 @@ from vibroimpact.fmus.packaging.platform_names import architecture, binary_folde
 from vibroimpact.fmus.packaging.zip_members import (
     DAMAGE,
     EXPANSION_LIMIT,
+    LONGEST_REASON,
     checked_members,
     cut,
     damaged,
@@ -38,7 +40,9 @@ from vibroimpact.fmus.private_folder import (
     refuse_links,
     refuse_unsafe,
 )
+from vibroimpact.fmus.reader_process import Order, read_apart
 from vibroimpact.fmus.safe_xml import refuse_large, root_of
+from vibroimpact.fmus.shipped import is_shipped
 
 #: Most bytes of a model identifier: with an ending it is the name of a file.
 LONGEST_IDENTIFIER = 240
@@ -54,6 +58,9 @@ PARSED_XML = (
 BLOCK = 1 << 20
 #: Libraries of another name that a message lists.
 MOST_LIBRARIES = 3
+#: Limits of reading the XML of an FMU: processor time, s, with its size over a rate, bytes/s; address space, bytes.
+XML_SECONDS, XML_RATE, XML_MEMORY = 10.0, 2e5, 4 << 30
+_READER = "vibroimpact.fmus.packaging.description_check:read"
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +235,7 @@ def _unpack_into_place(
         ) from error
     try:
         _extract(path, archive, members, temporary)
-        _check_xml(path, temporary)
+        _check_xml(path, folder.name, temporary)
         _rename(temporary, folder, archive, members)
         unpacked_cache.hold(folder)
     finally:
@@ -262,10 +269,23 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
         raise damaged(path, error) from error
 
 
-def _check_xml(path: Path, folder: Path) -> None:
-    for name in PARSED_XML:
-        if (folder / name).is_file():
-            root_of((folder / name).read_bytes(), f"{path}: {name}")
+def _check_xml(path: Path, digest: str, folder: Path) -> None:
+    """Raise ComponentFileError unless a process of its own can read the XML of an FMU within its limits.
+
+    FMUs of the package are known by their content.
+    """
+    if is_shipped(path.name, digest):
+        return
+    size = sum((folder / name).stat().st_size for name in PARSED_XML if (folder / name).is_file())
+    seconds = XML_SECONDS + size / XML_RATE
+    order = Order(_READER, os.path.abspath(folder), {"where": str(path)}, seconds, XML_MEMORY)
+    answer = read_apart(order)
+    if answer.error == ComponentFileError.__name__:
+        raise ComponentFileError(answer.text)
+    if answer.verdict != "read":
+        raise ComponentFileError(
+            f"{path}: modelDescription.xml: expected XML that can be read, got {answer.why(seconds)[:LONGEST_REASON]}."
+        )
 
 
 def _rename(temporary: Path, folder: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:

@@ -93,6 +93,8 @@ def read(content: bytes) -> Reading:
         members.writestr(DESCRIPTION, mended.content)
     try:
         return Reading(read_model_description(archive, validate=False), mended.findings)
+    except MemoryError:  # no fault of the description
+        raise
     except Exception as error:
         # FMPy raises plain Exception for what FMI's schema cannot say
         raise ComponentFileError(f"{DESCRIPTION}: {error}") from error

@@ -1,6 +1,6 @@
 """Parquet and Feather files, read with pyarrow: columns of numbers and of dates.
 
-pyarrow is compiled and can crash on damaged bytes, so that another process reads the file first.
+pyarrow is compiled and can crash on damaged bytes, in the process that `reading` asks.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.clock_columns import with_time
 from vibroimpact.hardware.formats.labels import split_label
-from vibroimpact.hardware.formats.probe import check_reads, missing_extra, one_refusal
+from vibroimpact.hardware.formats.probe import missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
 
 PARQUET, FEATHER = b"PAR1", b"ARROW1"
@@ -42,7 +41,6 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
         import pyarrow  # noqa: F401
     except ImportError as problem:
         raise missing_extra(f"a {kind} file", "pyarrow", "parquet") from problem
-    check_reads(path, LibraryRead(kind))
     with one_refusal(f"a whole {kind} file"):
         table, remarks = _table_of(path, kind)
     columns = [

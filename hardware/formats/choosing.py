@@ -6,8 +6,6 @@ import stat
 from dataclasses import replace
 from pathlib import Path
 
-from vibroimpact.analysis.files.probing import NETCDF
-from vibroimpact.analysis.recording import is_recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.hardware.formats.arrow import SIGNATURES as ARROW
@@ -73,11 +71,14 @@ def holds_recording(path: Path) -> bool:
     DatasetError
         It begins as one might, and crashes the library that reads it.
     """
+    # recordings take half a second to load, which the process that reads other formats does without
+    from vibroimpact.analysis.recording import is_recording
+
     with path.open("rb") as file:
         if file.read(len(HDF5)) != HDF5:
             return False
     try:
-        check_reads(path, NETCDF)
+        check_reads(path)
     except UnreadableError as problem:
         if problem.raised and is_h5py_there():
             return False  # HDF5 that is no NetCDF

@@ -1,7 +1,7 @@
 """NetCDF files of other programs: variables on one dimension, with their coordinate of time where there is one.
 
 Files of the classic format are read with scipy, in Python alone, since the C library can crash on damaged ones; files
-of version 4 (HDF5) are read by another process first, for the same reason.
+of version 4 (HDF5) have been read whole before by a process of their own, for the same reason.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """HDF5 files, read with h5py: datasets of numbers in groups, and MATLAB files of version 7.3.
 
 A file may name other files in links, in external storage and in virtual datasets: nothing of that is followed. h5py is
-compiled and can crash on damaged bytes, so that another process reads the file first.
+compiled and can crash on damaged bytes, in the process that `reading` asks.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrays import INTERVALS, RATES, Scope, tables_of
 from vibroimpact.hardware.formats.mat import NUMERIC
-from vibroimpact.hardware.formats.probe import check_reads, missing_extra, one_refusal
+from vibroimpact.hardware.formats.probe import missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -24,7 +23,6 @@ _UNITS = ("units", "unit")
 _CLASS = "MATLAB_class"
 _SPARSE = "MATLAB_sparse"
 """Attribute of a group of MATLAB that holds the values, rows and columns of a sparse matrix."""
-_READING = LibraryRead("HDF5", (*_UNITS, _CLASS.lower(), "matlab_empty", "class", *sorted(RATES | INTERVALS)))
 _DEEPEST = 16
 _MOST_OBJECTS = 10_000
 # MATLAB keeps what its cells refer to, and objects of its classes, in groups of these names.
@@ -44,8 +42,7 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
     """Whether an HDF5 file was written by a NetCDF library, or has dimensions as such a file has."""
     import h5py
 
-    check_reads(path, _READING)
-    with one_refusal("an HDF5 file that is whole"), h5py.File(path, "r") as file:
+    with one_refusal("a whole HDF5 file"), h5py.File(path, "r") as file:
         return "_NCProperties" in file.attrs or any(
             _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [], Scope())
         )
@@ -66,7 +63,6 @@ def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
         import h5py
     except ImportError as problem:
         raise missing_extra(what, "h5py", "hdf5") from problem
-    check_reads(path, _READING)
     remarks: list[str] = []
     scopes = [Scope()]
     with one_refusal(f"{what} that is whole"), h5py.File(path, "r") as file:

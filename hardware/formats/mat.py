@@ -1,7 +1,7 @@
 """MATLAB files up to version 7, read with scipy: vectors of numbers, also in structures.
 
-scipy's reader is compiled and can crash on damaged bytes, so that another process reads the file first. Version 7.3 is
-HDF5, see `hdf5`.
+scipy's reader is compiled and can crash on damaged bytes, in the process that `reading` asks. Version 7.3 is HDF5, see
+`hdf5`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrays import Scope, tables_of
-from vibroimpact.hardware.formats.probe import check_reads, one_refusal
+from vibroimpact.hardware.formats.probe import one_refusal
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
 
 _CREATED = re.compile(r"Created on: (?P<date>.{5,40})")
@@ -26,7 +25,6 @@ NUMERIC = frozenset(
 )
 _READ = NUMERIC | {"struct"}
 _DEEPEST = 8
-_READING = LibraryRead("MATLAB", tuple(sorted(_READ)))
 
 
 def read_mat(path: os.PathLike[str] | str) -> RawFile:
@@ -42,7 +40,6 @@ def read_mat(path: os.PathLike[str] | str) -> RawFile:
     from scipy.io import loadmat, whosmat
 
     with one_refusal("a whole MATLAB file"):
-        check_reads(path, _READING)
         listed = whosmat(path)
         _check_sizes(listed)
         chosen = [name for name, _, kind in listed if kind in _READ]

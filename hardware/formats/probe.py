@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from vibroimpact.analysis.files.probing import LibraryRead, UnsoundFileError, check_sound
+from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound
 from vibroimpact.fmus.errors import DatasetError
 
 
@@ -18,8 +18,8 @@ class UnreadableError(DatasetError):
         self.raised = raised
 
 
-def check_reads(path: os.PathLike[str] | str, reading: LibraryRead) -> None:
-    """Refuse a file that the library cannot read as it is about to; see `analysis.files.probing`.
+def check_reads(path: os.PathLike[str] | str) -> None:
+    """Refuse a NetCDF file that the library cannot read; see `analysis.files.probing`.
 
     Raises
     ------
@@ -27,9 +27,9 @@ def check_reads(path: os.PathLike[str] | str, reading: LibraryRead) -> None:
         Without the name of the file, which the importer puts before it.
     """
     try:
-        check_sound(path, reading)
+        check_sound(path)
     except UnsoundFileError as problem:
-        message = f"expected a whole {reading.library} file, got {problem}."
+        message = f"expected a whole NetCDF file, got {problem}."
         raise UnreadableError(message, problem.raised) from problem
     except DatasetError as problem:
         raise UnreadableError(str(problem).removeprefix(f"{os.path.abspath(path)}: "), "") from problem

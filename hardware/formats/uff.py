@@ -16,7 +16,7 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import seconds_in
-from vibroimpact.hardware.formats.probe import missing_extra
+from vibroimpact.hardware.formats.probe import missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
 
 SIGNATURE = re.compile(rb"(?:[ ]*\r?\n)*[ ]{4}-1[ ]*\r?\n[ ]{1,5}\d{1,5}(?:[bB][^\r\n]*)?[ ]*\r?\n")
@@ -65,7 +65,8 @@ def read_uff(path: os.PathLike[str] | str) -> RawFile:
     types, datasets, cut = read_datasets(path, frozenset({_FUNCTION, _UNITS}))
     functions = [found for found in datasets if found["type"] == _FUNCTION]
     units: Mapping[str, Any] = next((found for found in datasets if found["type"] == _UNITS), {})
-    raw = _sorted_out(functions, units, Counter(types), cut)
+    with one_refusal("a whole universal file (UFF)"):  # of which pyuff leaves out what it does not find
+        raw = _sorted_out(functions, units, Counter(types), cut)
     return replace(raw, damage=_CUT_OFF if cut else "")
 
 

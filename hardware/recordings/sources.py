@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.hardware.formats.choosing import read_raw
+from vibroimpact.hardware.formats.reading import read_file
 from vibroimpact.hardware.formats.table import RawFile
 from vibroimpact.hardware.formats.text import DELIMITERS
 from vibroimpact.hardware.recordings.columns import chosen_tables
@@ -61,7 +61,9 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
     with naming(path):
         delimiter = "" if own.delimiter is None else DELIMITERS[own.delimiter]
-        raw = read_raw(path, delimiter, own.decimal or "", own.dates or "")
+        raw = read_file(
+            path, delimiter=delimiter, decimal=own.decimal or "", dates=own.dates or ""
+        )
         chosen, counted, date = counted_from_start(chosen_tables(raw, own), own.rate)
         tables, joints = joined(chosen)
         pieces = [split_at_restarts(table) for table in tables]

@@ -46,7 +46,7 @@ def import_all() -> None:
     refuse_threads()
 
 
-PROGRAMS = ("vibroimpact.fmus.python", "vibroimpact.analysis.files.probe_child")
+PROGRAMS = ("vibroimpact.fmus.python",)
 """Modules that run in processes of their own alone."""
 LATE = (
     "matplotlib.backends.backend_agg",

@@ -2,10 +2,10 @@
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import netCDF4
 import numpy as np
@@ -30,34 +30,36 @@ from vibroimpact.analysis.recording import (
     open_signals,
     write_recording,
 )
+from vibroimpact.fmus import reader_process
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.reader_process import Answer, Order, ReaderServer
 
 DOORS = (open_dataset, open_measured, read_flat, read_part, open_recording, open_signals)
 CHILD = """
-import importlib.util, os, signal, sys, time
-specification = importlib.util.spec_from_file_location("probe_child", {child!r})
-probe_child = importlib.util.module_from_spec(specification)
-specification.loader.exec_module(probe_child)
+import os, signal, sys, time
+from vibroimpact.analysis.files import netcdf_values
+from vibroimpact.fmus import reader_child
 def read(path, options):
     if b"damaged" in open(path, "rb").read():
         {what}
-probe_child.READERS["NetCDF"] = ("netCDF4", read)
-probe_child.main()
+    return None, ()
+netcdf_values.read = read
+reader_child.main()
 """
 
 
 @pytest.fixture(autouse=True)
 def probes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Use a server of the test's own, with a cache of its own; give the files that it was asked to read."""
-    server, asked = probing._ProbeServer(), []
+    server, asked = ReaderServer(), []
     original = server.ask
 
-    def ask(order: dict[str, Any], seconds: float) -> dict[str, str]:
-        asked.append(Path(order["path"]).name)
-        return original(order, seconds)
+    def ask(order: Order) -> Answer:
+        asked.append(Path(order.path).name)
+        return original(order)
 
     monkeypatch.setattr(server, "ask", ask)
-    monkeypatch.setattr(probing, "_server", server)
+    monkeypatch.setattr(reader_process, "_server", server)
     monkeypatch.setattr(probing, "_of_files", {})
     monkeypatch.setattr(probing, "_of_contents", {})
     monkeypatch.setenv("VIBROIMPACT_CACHE", str(tmp_path / "cache"))
@@ -71,8 +73,8 @@ def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], N
 
     def set_up(what: str) -> None:
         child = tmp_path / "child.py"
-        child.write_text(CHILD.format(child=str(probing._CHILD), what=what))
-        monkeypatch.setattr(probing, "_CHILD", child)
+        child.write_text(CHILD.format(what=what))
+        monkeypatch.setattr(reader_process, "_CHILD", child)
 
     return set_up
 
@@ -137,7 +139,7 @@ def test_other_content_under_an_old_name_is_looked_at_again(tmp_path: Path, prob
         ("raise KeyError('x')", "got KeyError: 'x'"),
         ("raise SystemExit(0)", "got SystemExit: 0"),
         ("[0] * 10**12", "got MemoryError"),
-        ("print('sound', flush=True); os.abort()", "crashes the library"),
+        ('print(\'{"verdict": "read"}\', flush=True); os.abort()', "crashes the library"),
     ],
 )
 def test_whatever_a_file_does_to_its_reader_is_one_line(
@@ -175,22 +177,25 @@ def test_a_file_whose_reading_does_not_end_is_given_up(
 
 
 def test_a_killed_program_leaves_no_process_that_reads(tmp_path: Path, reader: Callable[[str], None]) -> None:
-    reader("open(path + '.reader', 'w').write(str(os.getpid())); time.sleep(60)")
+    reader("time.sleep(60)")
     path = tmp_path / "file.nc"
     path.write_bytes(b"a damaged file")
     code = (
         "import sys; from pathlib import Path; from vibroimpact.analysis import open_dataset\n"
-        "from vibroimpact.analysis.files import probing\n"
-        "probing._CHILD = Path(sys.argv[1]); open_dataset(sys.argv[2])"
+        "from vibroimpact.fmus import reader_process\n"
+        "reader_process._CHILD = Path(sys.argv[1]); open_dataset(sys.argv[2])"
     )
-    program = warm.start(code, probing._CHILD, path, stdout=None, stderr=None)
-    started = Path(f"{path}.reader")
-    _wait_until(lambda: started.exists() and started.read_text() != "")
-    below = psutil.Process(program.pid).children(recursive=True)
-    assert int(started.read_text()) in {process.pid for process in below}
+    program = warm.start(code, reader_process._CHILD, path, stdout=None, stderr=None)
+    _wait_until(lambda: len(_readers(program.pid)) == 2)
+    below = _readers(program.pid)
     program.kill()
     program.wait()
     _wait_until(lambda: not any(process.is_running() and process.status() != "zombie" for process in below))
+
+
+def _readers(process: int) -> list[psutil.Process]:
+    """Return the process below another that reads files, and the one that it has made for the file it reads."""
+    return psutil.Process(process).children(recursive=True)
 
 
 def _wait_until(happened: Callable[[], bool]) -> None:
@@ -212,11 +217,20 @@ def interruptible() -> Iterator[None]:
 def test_ctrl_c_during_the_look_ends_it_and_the_next_file_is_read(
     tmp_path: Path, reader: Callable[[str], None]
 ) -> None:
-    reader("os.kill(int(open(path).read().split()[-1]), signal.SIGINT); time.sleep(60)")
+    reader("time.sleep(60)")
     path = tmp_path / "file.nc"
-    path.write_text(f"a damaged file {os.getpid()}")
+    path.write_text("a damaged file")
+    server = reader_process._server
+
+    def interrupt() -> None:
+        _wait_until(lambda: server._process is not None and len(_readers(server._process.pid)) == 1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    meanwhile = threading.Thread(target=interrupt)
+    meanwhile.start()
     with pytest.raises(KeyboardInterrupt):
         check_sound(path)
+    meanwhile.join()
     (tmp_path / "other.nc").write_bytes(b"whole")
     check_sound(tmp_path / "other.nc")
 
@@ -225,7 +239,7 @@ def test_a_process_that_ended_for_want_of_work_is_started_again(
     tmp_path: Path, probes: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read_flat(old_dataset(tmp_path / "runs.nc"))
-    process = probing._server._process
+    process = reader_process._server._process
     assert process is not None
     process.kill()
     process.wait()
@@ -240,11 +254,11 @@ def test_a_file_that_changes_between_look_and_opening_is_refused(
 ) -> None:
     path = old_dataset(tmp_path / "runs.nc")
 
-    def ask(order: dict[str, Any], seconds: float) -> dict[str, str]:
+    def ask(order: Order) -> Answer:
         path.write_bytes(path.read_bytes() + b"more")
-        return {"verdict": "sound"}
+        return Answer("read")
 
-    monkeypatch.setattr(probing._server, "ask", ask)
+    monkeypatch.setattr(reader_process._server, "ask", ask)
     with pytest.raises(DatasetError, match="changed while it was being opened"):
         read_flat(path)
 
@@ -293,7 +307,8 @@ def test_a_cache_that_others_may_write_is_not_believed(
 
 def test_a_process_made_by_fork_has_a_server_of_its_own(tmp_path: Path) -> None:
     code = (
-        "import os, sys; from vibroimpact.analysis.files.probing import check_sound, _server\n"
+        "import os, sys; from vibroimpact.analysis.files.probing import check_sound\n"
+        "from vibroimpact.fmus.reader_process import _server\n"
         "check_sound(sys.argv[1]); child = os.fork()\n"
         "if child == 0:\n    check_sound(sys.argv[2]); _server.close(); os._exit(7)\n"
         "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7; check_sound(sys.argv[3])"

@@ -13,7 +13,8 @@ from pyarrow import feather, parquet
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.recordings import ImportSettings, import_recording
+from vibroimpact.hardware.formats.choosing import read_raw
+from vibroimpact.hardware.recordings import ImportSettings, import_recording, sources
 
 TIME = np.arange(80) / 512.0
 ACC = 9.81 * np.sin(TIME * 90.0)
@@ -79,6 +80,7 @@ def test_a_package_that_is_missing_is_named(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path, kind, time=TIME, acc=ACC)
+    monkeypatch.setattr(sources, "read_file", read_raw)  # in this process
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(DatasetError, match=r"pip install 'vibroimpact\[parquet\]'"):
         import_recording([path])

@@ -188,5 +188,18 @@ def test_a_damaged_matlab_file_cannot_take_the_program_with_it(place: int) -> No
 def test_a_file_that_kills_its_reader_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "record.nc"
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"\x00" * 200)
-    with pytest.raises(DatasetError, match=r"record\.nc: expected a whole HDF5 file, got OSError: "):
+    with pytest.raises(
+        DatasetError, match=r"record\.nc: expected a whole HDF5 file, got one that cannot be read"
+    ):
         import_recording([path])
+
+
+def test_what_the_writer_refuses_is_told_with_the_file_that_was_read(tmp_path: Path) -> None:
+    path = tmp_path / "record.lvm"
+    unsound = LABVIEW.replace("X0,0.0E+0,0.0E+0", "X0,1e300,1e300").replace(
+        "0.010000,0.010000", "1e308,1e308"
+    )
+    path.write_text(unsound + "".join(f"{k / 100:.6f},{a},{-a}\n" for k, a in enumerate(SIGNAL)))
+    with pytest.raises(DatasetError) as refused:
+        write_recording(import_recording([path]), tmp_path / "recording.nc")
+    assert all(line.startswith("record.lvm: ") for line in str(refused.value).splitlines())

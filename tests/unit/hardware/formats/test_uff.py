@@ -12,8 +12,9 @@ import pyuff
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.uff import read_uff
-from vibroimpact.hardware.recordings import ImportSettings, import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording, sources
 
 TIME = np.arange(200) / 256.0
 BASE = 9.81 * np.sin(TIME * 40.0)
@@ -139,6 +140,7 @@ def test_a_package_that_is_missing_is_named_with_how_to_get_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path, function("acc"))
+    monkeypatch.setattr(sources, "read_file", read_raw)  # in this process
     monkeypatch.setitem(sys.modules, "pyuff", None)
     with pytest.raises(DatasetError) as refused:
         import_recording([path], ImportSettings(rate=256.0))

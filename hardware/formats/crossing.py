@@ -1,0 +1,122 @@
+"""Carries a `RawFile` from one process to another: facts that JSON can say, and the arrays as raw bytes.
+
+What is one object in the file stays one: instants that several tables share, an array that two columns have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.hardware.formats.table import Column, RawFile, Table
+
+_PLAIN = ("label", "unit", "interval", "start", "group", "dated", "doubt")
+_KINDS = "fiub"
+
+
+class _Numbered:
+    """Objects by number, each once."""
+
+    def __init__(self) -> None:
+        self.items: list[Any] = []
+        self._places: dict[int, int] = {}
+
+    def place(self, item: Any) -> int | None:
+        """Return the number of an object; None for none."""
+        if item is None:
+            return None
+        place = self._places.setdefault(id(item), len(self.items))
+        if place == len(self.items):
+            self.items.append(item)
+        return place
+
+
+def packed(raw: RawFile) -> tuple[dict[str, Any], list[Any]]:
+    """Return a file as facts for JSON, and its arrays.
+
+    Cells that are no numbers (`Column.strange`) stay behind: the remarks have told them.
+    """
+    columns, arrays = _Numbered(), _Numbered()
+    tables = [
+        {
+            "columns": [columns.place(column) for column in table.columns],
+            "time": columns.place(table.time),
+            "title": table.title,
+            "vectors": table.vectors,
+            "time_place": table.time_place,
+            "rate": _plain(table.rate),
+        }
+        for table in raw.tables
+    ]
+    facts = {
+        "source_format": raw.source_format,
+        "remarks": list(raw.remarks),
+        "attrs": {key: _plain(value) for key, value in raw.attrs.items()},
+        "damage": raw.damage,
+        "tables": tables,
+        "columns": [_facts_of(column, arrays) for column in columns.items],
+        "kinds": [array.dtype.str for array in arrays.items],
+    }
+    return facts, [np.ascontiguousarray(array) for array in arrays.items]
+
+
+def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> RawFile:
+    """Return the file that `packed` has taken apart.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError, IndexError
+        It is none of that.
+    """
+    arrays = [
+        np.frombuffer(buffer, dtype=_kind(text)) for buffer, text in zip(buffers, facts["kinds"], strict=True)
+    ]
+    columns = [_column_of(known, arrays) for known in facts["columns"]]
+    tables = [
+        Table(
+            [columns[place] for place in known["columns"]],
+            None if known["time"] is None else columns[known["time"]],
+            str(known["title"]),
+            bool(known["vectors"]),
+            int(known["time_place"]),
+            known["rate"],
+        )
+        for known in facts["tables"]
+    ]
+    remarks = [str(line) for line in facts["remarks"]]
+    return RawFile(str(facts["source_format"]), tables, remarks, dict(facts["attrs"]), str(facts["damage"]))
+
+
+def _facts_of(column: Column, arrays: _Numbered) -> dict[str, Any]:
+    return {
+        **{name: _plain(getattr(column, name)) for name in _PLAIN},
+        "values": arrays.place(column.values),
+        "overrange": arrays.place(column.overrange),
+        "rails": None if column.rails is None else [float(limit) for limit in column.rails],
+        "attrs": {key: _plain(value) for key, value in column.attrs.items()},
+    }
+
+
+def _column_of(known: Mapping[str, Any], arrays: Sequence[Any]) -> Column:
+    rails = known["rails"]
+    return Column(
+        values=arrays[known["values"]],
+        overrange=None if known["overrange"] is None else arrays[known["overrange"]],
+        rails=None if rails is None else (float(rails[0]), float(rails[1])),
+        attrs=dict(known["attrs"]),
+        **{name: known[name] for name in _PLAIN},
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of numpy as one of Python."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _kind(text: str) -> np.dtype[Any]:
+    kind = np.dtype(text)
+    if kind.kind not in _KINDS:
+        raise ValueError(f"expected numbers, got {kind}")
+    return kind

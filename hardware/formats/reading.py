@@ -1,0 +1,106 @@
+"""Reads a file of any format in a process of its own: whatever its bytes do to a library, they do it there.
+
+The process has limits of time and memory, writes nothing and has no network (`fmus.confinement`).
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus import wording
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.reader_process import Answer, Order, read_apart
+from vibroimpact.hardware.formats import arrow, hdf5, labview, uff, wav
+from vibroimpact.hardware.formats.crossing import unpacked
+from vibroimpact.hardware.formats.table import RawFile
+
+SECONDS, RATE = 10.0, 2.5e5
+"""Limit of the processor time: a constant, s, and the size of the file over a rate, bytes/s.
+
+A text with cells that are no numbers, the slowest of all, is read at some 2e6 bytes/s.
+"""
+MEMORY, PER_BYTE = 4 << 30, 128
+"""Limit of the address space, bytes: of the libraries with what small files expand to, and for each byte of the file.
+
+A text of one digit a row takes 125 bytes for each of its own.
+"""
+_MOST_BYTES = 1 << 32
+_READER = "vibroimpact.hardware.formats.reading_child:read"
+_LONGEST_REASON = 300
+_KINDS: tuple[tuple[tuple[bytes, ...], str, tuple[str, ...]], ...] = (
+    ((b"TDSm", b"TDSh"), "TDMS", ("nptdms",)),
+    ((b"MATLAB 7.3",), "MATLAB", ("h5py",)),
+    ((b"MATLAB",), "MATLAB", ("scipy.io",)),
+    ((hdf5.SIGNATURE,), "HDF5", ("netCDF4", "h5py")),
+    ((b"CDF",), "NetCDF", ("scipy.io",)),
+    (wav.SIGNATURES, "WAV", ("scipy.io.wavfile",)),
+    (arrow.SIGNATURES, "Parquet or Feather", ("pyarrow.parquet", "pyarrow.ipc")),
+    ((labview.SIGNATURE.encode(),), "LabVIEW", ()),
+)
+"""First bytes of a file, what messages call it, and the modules that read it."""
+
+
+def read_file(path: Path, **options: Any) -> RawFile:
+    """Return what `choosing.read_raw` finds in a file, read in a process of its own.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file that `check_file` has passed.
+    **options
+        Those of `read_raw`, of what JSON can say.
+
+    Raises
+    ------
+    DatasetError, UsageError
+        As `read_raw`, and where the file crashes its library, or is not read within the limits.
+    """
+    size = path.stat().st_size
+    kind, libraries = _kind_of(path)
+    seconds = SECONDS + size / RATE
+    order = Order(
+        _READER,
+        os.path.abspath(path),
+        {"typed": bool(wording.typed_or_called("typed")), "reading": options},
+        seconds,
+        MEMORY + PER_BYTE * size,
+        _MOST_BYTES,
+        libraries,
+    )
+    answer = read_apart(order)
+    if answer.verdict == "raised":
+        _raise(answer)
+    if answer.verdict == "read":
+        try:
+            return unpacked(answer.facts, answer.buffers)
+        except (ValueError, TypeError, KeyError, IndexError) as problem:
+            raise DatasetError(
+                f"expected a whole {kind} file, got one that its library misreads."
+            ) from problem
+    raise DatasetError(f"expected a whole {kind} file, got {answer.why(seconds)[:_LONGEST_REASON]}.")
+
+
+def _kind_of(path: Path) -> tuple[str, tuple[str, ...]]:
+    """Return what messages call a file by its first bytes, and the modules that read it."""
+    with path.open("rb") as file:
+        start = file.read(512)
+    if uff.is_uff(start):
+        return "universal", ("pyuff",)
+    if path.suffix.lower() == ".mat" and not start.startswith(hdf5.SIGNATURE):
+        return "MATLAB", ("scipy.io",)
+    found = ((kind, libraries) for first, kind, libraries in _KINDS if start.startswith(first))
+    return next(found, ("text", ()))
+
+
+def _raise(answer: Answer) -> None:
+    """Raise the error of the process that read."""
+    for known in (DatasetError, UsageError):
+        if answer.error == known.__name__:
+            raise known(answer.text)
+    if answer.raised is not None:
+        raise answer.raised
+    if answer.error == "MemoryError":
+        raise MemoryError(answer.text)
+    raise RuntimeError(f"reading: {answer.error}: {answer.text}")

@@ -1,0 +1,20 @@
+"""The other end of `reading`: reads a file in the process that was asked to."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.recording.units import measured_unit
+from vibroimpact.fmus import wording
+from vibroimpact.hardware.formats.choosing import read_raw
+from vibroimpact.hardware.formats.crossing import packed
+
+measured_unit("g")  # loads the units once: this module is imported before a process is made for each file
+
+
+def read(path: str, options: dict[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+    """Return what a file holds, for another process; messages name options where a command was typed there."""
+    with wording.command_line() if options["typed"] else nullcontext():
+        return packed(read_raw(Path(path), **options["reading"]))
