@@ -1,4 +1,4 @@
-"""Carries a `RawFile` from one process to another: facts that JSON can say, and the arrays as raw bytes.
+"""Carries what was read from one process to another: facts that JSON can say, and the arrays as raw bytes.
 
 What is one object in the file stays one: instants that several tables share, an array that two columns have.
 """
@@ -14,6 +14,8 @@ from vibroimpact.hardware.formats.table import Column, RawFile, Table
 
 _PLAIN = ("label", "unit", "interval", "start", "group", "dated", "doubt")
 _KINDS = "fiub"
+_COMPLEX_KINDS = "fiubc"
+_ARRAY = "array"
 
 
 class _Numbered:
@@ -89,6 +91,52 @@ def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> RawFile:
     return RawFile(str(facts["source_format"]), tables, remarks, dict(facts["attrs"]), str(facts["damage"]))
 
 
+def packed_datasets(
+    types: Sequence[int], datasets: Sequence[Mapping[str, Any]], cut: bool
+) -> tuple[dict[str, Any], list[Any]]:
+    """Return what `uff.read_datasets` found as facts for JSON, and its arrays."""
+    arrays: list[Any] = []
+    facts = [{key: _value_of(value, arrays) for key, value in one.items()} for one in datasets]
+    return {"types": list(types), "datasets": facts, "cut": cut}, arrays
+
+
+def unpacked_datasets(
+    facts: Mapping[str, Any], buffers: Sequence[bytearray]
+) -> tuple[list[int], list[dict[str, Any]], bool]:
+    """Return what `packed_datasets` has taken apart.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError, IndexError
+        It is none of that.
+    """
+    datasets = [
+        {str(key): _value_in(value, buffers) for key, value in one.items()} for one in facts["datasets"]
+    ]
+    return [int(kind) for kind in facts["types"]], datasets, bool(facts["cut"])
+
+
+def _value_of(value: Any, arrays: list[Any]) -> Any:
+    """Return a value of a dataset for JSON: numbers of an array, or complex ones, become an array."""
+    numbers = (
+        np.asarray(value) if isinstance(value, np.ndarray | np.generic | complex | list | tuple) else None
+    )
+    if numbers is None:
+        return value
+    if numbers.dtype.kind not in _COMPLEX_KINDS:
+        return numbers.tolist()
+    arrays.append(np.ascontiguousarray(numbers))
+    return {_ARRAY: len(arrays) - 1, "kind": numbers.dtype.str, "shape": list(numbers.shape)}
+
+
+def _value_in(value: Any, buffers: Sequence[bytearray]) -> Any:
+    if not isinstance(value, Mapping):
+        return value
+    kind = _kind(value["kind"], _COMPLEX_KINDS)
+    numbers = np.frombuffer(buffers[value[_ARRAY]], dtype=kind).reshape(value["shape"])
+    return numbers if numbers.ndim else numbers[()]
+
+
 def _facts_of(column: Column, arrays: _Numbered) -> dict[str, Any]:
     return {
         **{name: _plain(getattr(column, name)) for name in _PLAIN},
@@ -115,8 +163,8 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _kind(text: str) -> np.dtype[Any]:
+def _kind(text: str, kinds: str = _KINDS) -> np.dtype[Any]:
     kind = np.dtype(text)
-    if kind.kind not in _KINDS:
+    if kind.kind not in kinds:
         raise ValueError(f"expected numbers, got {kind}")
     return kind

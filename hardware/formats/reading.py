@@ -6,14 +6,15 @@ The process has limits of time and memory, writes nothing and has no network (`f
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from vibroimpact.fmus import wording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.reader_process import Answer, Order, read_apart
 from vibroimpact.hardware.formats import arrow, hdf5, labview, uff, wav
-from vibroimpact.hardware.formats.crossing import unpacked
+from vibroimpact.hardware.formats.crossing import unpacked, unpacked_datasets
 from vibroimpact.hardware.formats.table import RawFile
 
 SECONDS, RATE = 10.0, 2.5e5
@@ -28,6 +29,8 @@ A text of one digit a row takes 125 bytes for each of its own.
 """
 _MOST_BYTES = 1 << 32
 _READER = "vibroimpact.hardware.formats.reading_child:read"
+_READER_OF_DATASETS = "vibroimpact.hardware.formats.reading_child:read_datasets"
+Found = TypeVar("Found")
 _LONGEST_REASON = 300
 _KINDS: tuple[tuple[tuple[bytes, ...], str, tuple[str, ...]], ...] = (
     ((b"TDSm", b"TDSh"), "TDMS", ("nptdms",)),
@@ -57,11 +60,29 @@ def read_file(path: Path, **options: Any) -> RawFile:
     DatasetError, UsageError
         As `read_raw`, and where the file crashes its library, or is not read within the limits.
     """
+    return _read_apart(path, _READER, options, unpacked)
+
+
+def read_datasets_apart(path: Path, wanted: frozenset[int]) -> tuple[list[int], list[dict[str, Any]], bool]:
+    """Return what `uff.read_datasets` finds in a universal file, read in a process of its own.
+
+    Raises
+    ------
+    DatasetError
+        As `read_file`.
+    """
+    return _read_apart(path, _READER_OF_DATASETS, {"wanted": sorted(wanted)}, unpacked_datasets)
+
+
+def _read_apart(
+    path: Path, reader: str, options: Mapping[str, Any], taken: Callable[[Any, Sequence[bytearray]], Found]
+) -> Found:
+    """Return what a reader finds in a file, taken from the facts and buffers of its answer."""
     size = path.stat().st_size
     kind, libraries = _kind_of(path)
     seconds = SECONDS + size / RATE
     order = Order(
-        _READER,
+        reader,
         os.path.abspath(path),
         {"typed": bool(wording.typed_or_called("typed")), "reading": options},
         seconds,
@@ -74,7 +95,7 @@ def read_file(path: Path, **options: Any) -> RawFile:
         _raise(answer)
     if answer.verdict == "read":
         try:
-            return unpacked(answer.facts, answer.buffers)
+            return taken(answer.facts, answer.buffers)
         except (ValueError, TypeError, KeyError, IndexError) as problem:
             raise DatasetError(
                 f"expected a whole {kind} file, got one that its library misreads."

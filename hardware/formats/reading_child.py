@@ -9,7 +9,8 @@ from typing import Any
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus import wording
 from vibroimpact.hardware.formats.choosing import read_raw
-from vibroimpact.hardware.formats.crossing import packed
+from vibroimpact.hardware.formats.crossing import packed, packed_datasets
+from vibroimpact.hardware.formats.uff import read_datasets as datasets_of
 
 measured_unit("g")  # loads the units once: this module is imported before a process is made for each file
 
@@ -18,3 +19,8 @@ def read(path: str, options: dict[str, Any]) -> tuple[dict[str, Any], list[Any]]
     """Return what a file holds, for another process; messages name options where a command was typed there."""
     with wording.command_line() if options["typed"] else nullcontext():
         return packed(read_raw(Path(path), **options["reading"]))
+
+
+def read_datasets(path: str, options: dict[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+    """Return the datasets of a universal file, for another process."""
+    return packed_datasets(*datasets_of(path, frozenset(options["reading"]["wanted"])))

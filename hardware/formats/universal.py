@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.probe import one_refusal
+from vibroimpact.hardware.formats.reading import read_datasets_apart
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Floats
-from vibroimpact.hardware.formats.uff import DIRECTIONS, KINDS, read_datasets, text_of
+from vibroimpact.hardware.formats.uff import DIRECTIONS, KINDS, text_of
 
 _FUNCTION, _SHAPE, _NODES, _TRACE, _NODES_IN_FULL, _UNITS = 58, 55, 15, 82, 2411, 164
 _READ = frozenset({_FUNCTION, _SHAPE, _NODES, _TRACE, _NODES_IN_FULL, _UNITS})
@@ -143,7 +145,7 @@ def read_universal(path: os.PathLike[str] | str) -> UniversalFile:
     DatasetError
         pyuff is not installed, the file is damaged, cut off, or holds more than an import takes.
     """
-    types, datasets, cut = read_datasets(path, _READ)
+    types, datasets, cut = read_datasets_apart(Path(path), _READ)
     if cut:
         raise DatasetError(f"{path}: expected a whole universal file (UFF), got one that is cut off.")
     of_type = {kind: [found for found in datasets if found["type"] == kind] for kind in _READ}
