@@ -13,12 +13,18 @@ import math
 import os
 import signal
 import sys
+from pathlib import Path
 
 #: Wall time that a process gets, as a multiple of its processor time: the machine may be busy with other work.
 PATIENCE = 6.0
+UNKNOWN_MEMORY = 8 * 2**30
+"""Memory that is assumed where the system does not say it, byte."""
+_CGROUP = Path("/sys/fs/cgroup/memory.max")
 #: Numbers of the system calls, equal on all architectures that Python packages are built for.
 _CREATE_RULESET, _RESTRICT_SELF = 444, 446
 _ASK_VERSION = 1
+#: Options of Linux' prctl.
+_PARENT_DEATH_SIGNAL = 1
 _NO_NEW_PRIVILEGES = 38
 #: Rights of version 1: all but reading files and folders (bits 2 and 3); then what later versions have added.
 _EXECUTE, _CHANGE = 0b1, 0b1_1111_1111_0010
@@ -41,21 +47,59 @@ def confine(seconds: float, memory: int) -> None:
     seconds : float
         Processor time, s; of wall time it gets `PATIENCE` times as much.
     memory : int
-        Address space, bytes.
+        Memory beyond what it has now, bytes; never more than the machine has.
     """
     import resource
 
-    ending = {signal.SIGALRM, signal.SIGPROF, signal.SIGXCPU, signal.SIGINT}
-    for number in ending:
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, ending)
+    _let_signals_end_it()
     signal.setitimer(signal.ITIMER_PROF, seconds)
     signal.setitimer(signal.ITIMER_REAL, PATIENCE * seconds)
     lower_limit(resource.RLIMIT_CPU, math.ceil(seconds) + 1)  # code that stops a timer does not stop this
     lower_limit(resource.RLIMIT_CORE, 0)
     lower_limit(resource.RLIMIT_FSIZE, 0)
-    lower_limit(resource.RLIMIT_AS, memory)
+    lower_limit(resource.RLIMIT_AS, _address_space() + min(memory, machine_memory()))
     forbid_writing_and_network()
+
+
+def end_with_parent(parent: int) -> None:
+    """Let the system end this process with the one that made it, where it can: on Linux."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:
+            os._exit(1)
+
+
+def machine_memory() -> int:
+    """Return the memory that this machine, or this container, has, byte."""
+    try:
+        found = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        found = UNKNOWN_MEMORY
+    try:
+        limit = _CGROUP.read_text(encoding="ascii").strip()
+    except OSError:
+        return found
+    return min(found, int(limit)) if limit.isdecimal() else found
+
+
+def _let_signals_end_it() -> None:
+    """Let signals that limit or stop this process end it, whatever its maker does with them; ignored ones stay so."""
+    limits = {signal.SIGALRM, signal.SIGPROF, signal.SIGXCPU}
+    stops = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    ending = limits | {number for number in stops if signal.getsignal(number) != signal.SIG_IGN}
+    signal.set_wakeup_fd(-1)
+    for number in ending:
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ending)
+
+
+def _address_space() -> int:
+    """Return the address space of this process, bytes; 0 where the system does not say it."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 def lower_limit(limit: int, value: int) -> None:

@@ -1,9 +1,9 @@
 """The process in which files of strangers are read: whatever damaged bytes do to the libraries, they do it here.
 
-Run by `reader_process`, as a file. Each line of standard input is an order, a JSON object. The answer is a line of
-JSON: {"verdict": "read" | "raised" | "late" | "died", ...}, for "read" with the sizes of the buffers whose bytes
-follow. Each file is read in a process of its own, made by `fork` from this one, in which the libraries are imported
-already, and which `confinement` limits. Nothing is pickled.
+Each file is read in a process of its own, made by `fork` from one in which the libraries are imported already, and
+limited by `confinement`. Run as a file, this module is a server that forks: each line of standard input is an order, a
+JSON object. The answer is a line of JSON: {"verdict": "read" | "raised" | "late" | "died", ...}, for "read" with the
+sizes of the buffers whose bytes follow. Nothing is pickled.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import os
 import select
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
-from vibroimpact.fmus.confinement import confine
+from vibroimpact.fmus.confinement import confine, end_with_parent
 
-#: After this time without a file to read this process ends, s.
+#: After this time without a file to read the server ends, s.
 IDLE = 30.0
 LONGEST_TEXT = 20_000
 _LATE = frozenset(
@@ -30,7 +30,41 @@ _LATE = frozenset(
 Message = tuple[bytes, Sequence[Any]]
 
 
-def read_here(order: dict[str, Any]) -> Message:
+def import_libraries(order: Mapping[str, Any]) -> None:
+    """Import what reads the file of an order, once for all files."""
+    for name in (*order["libraries"], order["reader"].partition(":")[0]):
+        with contextlib.suppress(ImportError):  # the reader says what is not installed
+            importlib.import_module(name)
+
+
+def read_and_end(order: Mapping[str, Any], parent: int, answers: int, begins: int | None = None) -> NoReturn:
+    """Read a file within limits, answer, and end this process.
+
+    Parameters
+    ----------
+    order : mapping
+        Of an `Order`.
+    parent : int
+        The process that made this one, with which it ends.
+    answers, begins : int
+        Descriptors: of the answer, and of a byte that says that it begins.
+    """
+    code = 1
+    try:
+        end_with_parent(parent)
+        confine(order["seconds"], order["memory"])
+        message = read_here(order)
+        for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # whoever takes the answer may be slow
+            signal.setitimer(timer, 0.0)
+        if begins is not None:
+            os.write(begins, b"1")
+        _send(answers, message)
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def read_here(order: Mapping[str, Any]) -> Message:
     """Read the file of an order in this process; return the line that answers and its buffers."""
     try:
         module, _, function = order["reader"].partition(":")
@@ -54,6 +88,12 @@ def _raised(error: BaseException) -> dict[str, Any]:
     return found
 
 
+def how_it_ended(status: int) -> dict[str, str]:
+    """Return the answer for a process that has not answered, by the status of its end."""
+    ended_by = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+    return {"verdict": "late" if ended_by in _LATE else "died", "error": str(ended_by or "")}
+
+
 def _line(found: dict[str, Any]) -> bytes:
     return json.dumps(found).encode() + b"\n"
 
@@ -66,13 +106,14 @@ def _send(answers: int, message: Message) -> None:
             rest = rest[os.write(answers, rest) :]
 
 
-def read_in_fork(order: dict[str, Any], answers: int) -> None:
+def _read_in_fork(order: dict[str, Any], answers: int) -> None:
     """Let a process of its own read the file of an order, and answer; say how it ended where it does not."""
     has_begun, begins = os.pipe()
+    server = os.getpid()
     process = os.fork()
     if process == 0:
         os.close(has_begun)
-        _read_and_end(order, begins, answers)
+        read_and_end(order, server, answers, begins)
     os.close(begins)
     with os.fdopen(has_begun, "rb") as pipe:
         # standard input speaks only when nobody waits for this answer any more
@@ -83,24 +124,7 @@ def read_in_fork(order: dict[str, Any], answers: int) -> None:
     if status and answered:
         os._exit(1)  # within its answer, which nobody can read on from
     if not answered:
-        ended_by = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-        verdict = "late" if ended_by in _LATE else "died"
-        _send(answers, (_line({"verdict": verdict, "error": str(ended_by or "")}), ()))
-
-
-def _read_and_end(order: dict[str, Any], begins: int, answers: int) -> NoReturn:
-    """Read a file, answer, and end this process."""
-    code = 1
-    try:
-        confine(order["seconds"], order["memory"])
-        message = read_here(order)
-        for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # whoever takes the answer may be slow
-            signal.setitimer(timer, 0.0)
-        os.write(begins, b"1")
-        _send(answers, message)
-        code = 0
-    finally:
-        os._exit(code)
+        _send(answers, (_line(how_it_ended(status)), ()))
 
 
 def main() -> None:
@@ -113,11 +137,9 @@ def main() -> None:
         if not line:
             return
         order = json.loads(line)
-        for name in (*order["libraries"], order["reader"].partition(":")[0]):
-            with contextlib.suppress(ImportError):  # the reader says what is not installed
-                importlib.import_module(name)
+        import_libraries(order)
         if forks:
-            read_in_fork(order, answers)
+            _read_in_fork(order, answers)
         else:
             _send(answers, read_here(order))
 

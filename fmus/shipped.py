@@ -49,14 +49,14 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
     return path
 
 
-def is_shipped(file_name: str, digest: str) -> bool:
-    """Return whether a content, by its SHA-256, is that of an FMU of the package with this file name."""
+def is_shipped(size: int, digest: str) -> bool:
+    """Return whether a content, by its size (bytes) and SHA-256, is that of an FMU of the package, of any name."""
     for folder in FOLDERS.values():
-        path = package_folder() / "built" / folder / file_name
-        if path.is_file():
-            with path.open("rb") as file:
-                if hashlib.file_digest(file, "sha256").hexdigest() == digest:
-                    return True
+        for path in (package_folder() / "built" / folder).glob("*.fmu"):
+            if path.stat().st_size == size:
+                with path.open("rb") as file:
+                    if hashlib.file_digest(file, "sha256").hexdigest() == digest:
+                        return True
     return False
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
-from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.archive import refuse_broken_description, unpack
 from vibroimpact.service.recordings import refuse_device
 
+DESCRIPTION_SECONDS = 3.0
+"""Processor time of reading a description, s, as scenes of the service do: one that takes more is not taken."""
 MOST_FMUS = 100
 """FMUs that a service keeps."""
 NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.+\-]{0,99}\.fmu$"
@@ -46,7 +47,7 @@ class FmuStore:
     def add(self, file: Path, name: str) -> Path:
         """Take an FMU that was uploaded: moved to its place once its archive and its description are in order.
 
-        Nothing of it is loaded.
+        Nothing of it is loaded, and its description is read by a process of its own.
 
         Raises
         ------
@@ -55,8 +56,7 @@ class FmuStore:
         """
         refuse_device(name)
         try:
-            unpack(file)
-            read_description(file)
+            refuse_broken_description(unpack(file), DESCRIPTION_SECONDS)
         except ComponentFileError as error:
             raise UsageError(str(error).replace(str(file), name)) from None
         target = self.folder / name

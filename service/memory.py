@@ -1,9 +1,6 @@
-"""Memory of the machine, and how much of it the imports of uploaded files may take together."""
+"""How much of the machine's memory the imports of uploaded files may take together."""
 
 from __future__ import annotations
-
-import os
-from pathlib import Path
 
 MOST_MEMORY = 8 * 2**30
 """Address space of one import, byte."""
@@ -13,22 +10,6 @@ SHARE = 0.75
 """Part of the machine's memory that all imports may take together."""
 MOST_AT_ONCE = 4
 """Imports at a time, on a machine of any memory."""
-UNKNOWN_MEMORY = 8 * 2**30
-"""Memory that is assumed where the system does not say it, byte."""
-_CGROUP = Path("/sys/fs/cgroup/memory.max")
-
-
-def machine_memory() -> int:
-    """Return the memory that this machine, or this container, has, byte."""
-    try:
-        found = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        found = UNKNOWN_MEMORY
-    try:
-        limit = _CGROUP.read_text(encoding="ascii").strip()
-    except OSError:
-        return found
-    return min(found, int(limit)) if limit.isdecimal() else found
 
 
 def import_memory(machine: int) -> int:

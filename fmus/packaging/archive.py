@@ -58,8 +58,9 @@ PARSED_XML = (
 BLOCK = 1 << 20
 #: Libraries of another name that a message lists.
 MOST_LIBRARIES = 3
-#: Limits of reading the XML of an FMU: processor time, s, with its size over a rate, bytes/s; address space, bytes.
-XML_SECONDS, XML_RATE, XML_MEMORY = 10.0, 2e5, 4 << 30
+#: Limits of reading the XML of an FMU: processor time, s, with its size over a rate, bytes/s; memory, bytes. Plain
+#: descriptions are read at 2e6 bytes/s, and take 25 bytes for each of their own.
+XML_SECONDS, XML_RATE, XML_MEMORY = 10.0, 5e5, 2 << 30
 _READER = "vibroimpact.fmus.packaging.description_check:read"
 
 
@@ -270,22 +271,47 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
 
 
 def _check_xml(path: Path, digest: str, folder: Path) -> None:
-    """Raise ComponentFileError unless a process of its own can read the XML of an FMU within its limits.
+    """Raise ComponentFileError unless the XML of an FMU can be read; FMUs of the package are known by their content."""
+    if not is_shipped(path.stat().st_size, digest):
+        size = sum((folder / name).stat().st_size for name in PARSED_XML if (folder / name).is_file())
+        _read_apart(path, folder, XML_SECONDS + size / XML_RATE)
 
-    FMUs of the package are known by their content.
+
+def refuse_broken_description(fmu: UnpackedFmu, seconds: float) -> None:
+    """Let a process of its own read the description of an FMU, for who shall not read it himself.
+
+    Parameters
+    ----------
+    fmu : UnpackedFmu
+    seconds : float
+        Processor time that its XML may take, s.
+
+    Raises
+    ------
+    ComponentFileError
+        It takes longer, or breaks FMI's rules where there is no way round.
     """
-    if is_shipped(path.name, digest):
-        return
-    size = sum((folder / name).stat().st_size for name in PARSED_XML if (folder / name).is_file())
-    seconds = XML_SECONDS + size / XML_RATE
-    order = Order(_READER, os.path.abspath(folder), {"where": str(path)}, seconds, XML_MEMORY)
-    answer = read_apart(order)
+    refusal = _read_apart(fmu.source, fmu.folder, seconds)
+    if refusal:
+        raise ComponentFileError(refusal)
+
+
+def _read_apart(path: Path, folder: Path, seconds: float) -> str:
+    """Let a process of its own read the XML of an FMU; return which of FMI's rules it breaks.
+
+    Raises
+    ------
+    ComponentFileError
+        The XML cannot be read within the limits.
+    """
+    answer = read_apart(Order(_READER, os.path.abspath(folder), {"where": str(path)}, seconds, XML_MEMORY))
     if answer.error == ComponentFileError.__name__:
         raise ComponentFileError(answer.text)
     if answer.verdict != "read":
         raise ComponentFileError(
             f"{path}: modelDescription.xml: expected XML that can be read, got {answer.why(seconds)[:LONGEST_REASON]}."
         )
+    return str(answer.facts)
 
 
 def _rename(temporary: Path, folder: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:

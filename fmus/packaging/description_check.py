@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +11,26 @@ from vibroimpact.fmus.packaging.archive import PARSED_XML
 from vibroimpact.fmus.safe_xml import root_of
 
 
-def read(path: str, options: dict[str, Any]) -> tuple[None, tuple[()]]:
+def read(path: str, options: dict[str, Any]) -> tuple[str, tuple[()]]:
     """Parse the XML of an unpacked FMU; messages begin with the option `where`.
+
+    Returns
+    -------
+    str
+        Which of FMI's rules the description breaks where there is no way round; empty where none. It is told where the
+        description is used.
 
     Raises
     ------
     ComponentFileError
-        It is not well-formed, or declares a document type or an entity. What else is wrong with a description is told
-        where it is used.
+        It is not well-formed, or declares a document type or an entity.
     """
     for name in PARSED_XML:
         file = Path(path, name)
         if file.is_file():
             root_of(file.read_bytes(), f"{options['where']}: {name}")
-    with contextlib.suppress(ComponentFileError):  # of FMI's rules, which are told where the description is used
+    try:
         fmpy_door.read(Path(path, fmpy_door.DESCRIPTION).read_bytes())
-    return None, ()
+    except ComponentFileError as error:
+        return "\n".join(f"{options['where']}: {line}" for line in str(error).splitlines()), ()
+    return "", ()

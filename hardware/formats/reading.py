@@ -23,7 +23,7 @@ SECONDS, RATE = 10.0, 2.5e5
 A text with cells that are no numbers, the slowest of all, is read at some 2e6 bytes/s.
 """
 MEMORY, PER_BYTE = 4 << 30, 128
-"""Limit of the address space, bytes: of the libraries with what small files expand to, and for each byte of the file.
+"""Limit of the memory, bytes: what small files expand to, and for each byte of the file.
 
 A text of one digit a row takes 125 bytes for each of its own.
 """
@@ -92,7 +92,7 @@ def _read_apart(
     )
     answer = read_apart(order)
     if answer.verdict == "raised":
-        _raise(answer)
+        raise _error_of(answer, kind)
     if answer.verdict == "read":
         try:
             return taken(answer.facts, answer.buffers)
@@ -115,13 +115,17 @@ def _kind_of(path: Path) -> tuple[str, tuple[str, ...]]:
     return next(found, ("text", ()))
 
 
-def _raise(answer: Answer) -> None:
-    """Raise the error of the process that read."""
+def _error_of(answer: Answer, kind: str) -> Exception:
+    """Return the error of the process that read; one that no reader foresaw is what the file did to it."""
     for known in (DatasetError, UsageError):
         if answer.error == known.__name__:
-            raise known(answer.text)
-    if answer.raised is not None:
-        raise answer.raised
+            return known(answer.text)
     if answer.error == "MemoryError":
-        raise MemoryError(answer.text)
-    raise RuntimeError(f"reading: {answer.error}: {answer.text}")
+        return MemoryError(answer.text)
+    if answer.raised is not None:
+        return answer.raised
+    got = f"{answer.error}: {answer.text}".rstrip(": ")[:_LONGEST_REASON]
+    return DatasetError(
+        f"expected a whole {kind} file, got one that cannot be read ({got}). "
+        "Report it where another program reads it."
+    )

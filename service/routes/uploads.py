@@ -15,7 +15,8 @@ from pathlib import Path
 from fastapi import Request
 from starlette.requests import ClientDisconnect
 
-from vibroimpact.service.memory import imports_at_once, machine_memory
+from vibroimpact.fmus.confinement import machine_memory
+from vibroimpact.service.memory import imports_at_once
 from vibroimpact.service.problems import ProblemError
 
 MOST_RECEIVED = 16

@@ -493,7 +493,7 @@ def test_a_foreign_description_is_read_by_a_process_of_its_own_once(tmp_path: Pa
 
 
 def test_components_of_the_package_are_known_by_their_content(tmp_path: Path, asked: list[str]) -> None:
-    copy = tmp_path / "Oscillator.fmu"
+    copy = tmp_path / "renamed.fmu"
     shutil.copy(fmu_path("Oscillator"), copy)
     unpack(copy)
     assert asked == []

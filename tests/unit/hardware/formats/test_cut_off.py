@@ -10,7 +10,15 @@ from nptdms import ChannelObject, TdmsWriter
 
 from vibroimpact.analysis.recording import Quality, Recording
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.recordings import import_recording
+from vibroimpact.hardware.formats.choosing import read_raw
+from vibroimpact.hardware.recordings import import_recording, sources
+
+
+@pytest.fixture(autouse=True)
+def read_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read files in this process: there are a thousand, and a process for each takes 20 ms."""
+    monkeypatch.setattr(sources, "read_file", read_raw)
+
 
 ROWS = 40
 TIME = np.arange(ROWS) / 1000.0

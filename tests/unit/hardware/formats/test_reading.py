@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from soak.recordings import whole
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.wording import command_line
-from vibroimpact.hardware.formats import reading
+from vibroimpact.hardware.formats import reading, reading_child
 from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.crossing import packed, unpacked
 from vibroimpact.hardware.formats.reading import read_file
@@ -51,10 +52,28 @@ def same_files(one: RawFile, other: RawFile) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(whole()))
-def test_a_file_of_every_format_reads_in_the_other_process_as_here(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("asked", [nullcontext, command_line], ids=["by the server", "by a fork"])
+def test_a_file_of_every_format_reads_in_the_other_process_as_here(
+    tmp_path: Path, name: str, asked: Callable[[], AbstractContextManager[None]]
+) -> None:
     path = tmp_path / name
     path.write_bytes(whole()[name])
-    same_files(read_file(path), read_raw(path))
+    with asked():
+        same_files(read_file(path), read_raw(path))
+
+
+def test_an_error_that_no_reader_foresaw_is_a_refusal_with_the_name_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read_raw(path: Path, **options: str) -> RawFile:
+        raise KeyError("data")
+
+    monkeypatch.setattr(reading_child, "read_raw", read_raw)
+    path = tmp_path / "record.csv"
+    path.write_text("1,2\n3,4\n")
+    said = r"record\.csv: expected a whole text file, got one that cannot be read \(KeyError: 'data'\)\. Report it"
+    with command_line(), pytest.raises(DatasetError, match=said):
+        import_recording([path])
 
 
 def test_what_is_one_column_or_array_stays_one_on_its_way() -> None:
