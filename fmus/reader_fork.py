@@ -82,7 +82,8 @@ def read_in_fork(order: Order) -> Answer | None:
         return found
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM:
         return None
-    return Answer(**how_it_ended(status))
+    ended = how_it_ended(status)
+    return Answer(ended["verdict"], error=ended["error"])
 
 
 def _leave_all_files(answer: int) -> None:
