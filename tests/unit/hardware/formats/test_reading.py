@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 from soak.recordings import whole
+from support.command_line import in_this_process
 
+from vibroimpact.fmus import reader_process
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.reader_process import ReaderServer
 from vibroimpact.fmus.wording import command_line
 from vibroimpact.hardware.formats import reading, reading_child
 from vibroimpact.hardware.formats.choosing import read_raw
@@ -74,6 +77,22 @@ def test_an_error_that_no_reader_foresaw_is_a_refusal_with_the_name_of_the_file(
     said = r"record\.csv: expected a whole text file, got one that cannot be read \(KeyError: 'data'\)\. Report it"
     with command_line(), pytest.raises(DatasetError, match=said):
         import_recording([path])
+
+
+def test_a_command_reads_by_a_fork_and_starts_no_python_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python, numpy and pint took 1.3 s of processor time, a fork takes 0.02 s."""
+    server = ReaderServer()
+    monkeypatch.setattr(reader_process, "_server", server)
+    path = tmp_path / "record.tdms"
+    path.write_bytes(whole()["record.tdms"])
+    done = in_this_process("import", path, "-o", tmp_path / "recording.nc")
+    assert done.returncode == 0, done.stderr
+    assert server._process is None
+    read_file(path)
+    assert server._process is not None
+    server.close()
 
 
 def test_what_is_one_column_or_array_stays_one_on_its_way() -> None:
