@@ -58,7 +58,7 @@ def read_and_end(order: Mapping[str, Any], parent: int, answers: int, begins: in
             signal.setitimer(timer, 0.0)
         if begins is not None:
             os.write(begins, b"1")
-        _send(answers, message)
+        send(answers, message)
         code = 0
     finally:
         os._exit(code)
@@ -98,7 +98,8 @@ def _line(found: dict[str, Any]) -> bytes:
     return json.dumps(found).encode() + b"\n"
 
 
-def _send(answers: int, message: Message) -> None:
+def send(answers: int, message: Message) -> None:
+    """Write a line and its buffers whole."""
     line, buffers = message
     for part in (line, *buffers):
         rest = memoryview(part)
@@ -124,7 +125,7 @@ def _read_in_fork(order: dict[str, Any], answers: int) -> None:
     if status and answered:
         os._exit(1)  # within its answer, which nobody can read on from
     if not answered:
-        _send(answers, (_line(how_it_ended(status)), ()))
+        send(answers, (_line(how_it_ended(status)), ()))
 
 
 def main() -> None:
@@ -141,7 +142,7 @@ def main() -> None:
         if forks:
             _read_in_fork(order, answers)
         else:
-            _send(answers, read_here(order))
+            send(answers, read_here(order))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
-"""Lets a fork of this process read a file of a stranger, where a fork is sound: nothing has to be imported again.
+"""Lets a fork of this process read a file of a stranger: nothing has to be imported again.
 
-A fork has the memory of this process, and none of its descriptors: it can write nothing and tell nobody.
+A fork has the memory of this process, and none of its descriptors: it can write nothing and tell nobody. It lacks the
+other threads; one that waits for a lock of theirs is given up, and says nothing of the file.
 """
 
 from __future__ import annotations
@@ -8,82 +9,110 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import sys
 import threading
+import time
 import warnings
 from dataclasses import asdict
+from pathlib import Path
 
 from vibroimpact.fmus.confinement import PATIENCE
 from vibroimpact.fmus.reader_child import how_it_ended, import_libraries, read_and_end
 from vibroimpact.fmus.reader_orders import Answer, Order, received
-from vibroimpact.fmus.wording import typed_or_called
 
-WAITING = "waits for the end of another process"
-"""Name of a thread that holds no lock while it waits, so that a fork without it is sound."""
 #: Wall time beyond that of the limits after which a fork is killed, s: the fork itself ends before.
 GRACE = 10.0
+#: Wall time after which a fork that sleeps and computes nothing is given up, s; one that waits for a disk is not.
+PATIENCE_WITH_SLEEP = 3.0
+_GLANCE = 0.2
+"""Wall time between two looks at a fork, s."""
 _ANSWER = 3
 
 
-_own_program = False
+class _Watch:
+    """Kills a fork that takes too long, or waits for what never comes."""
+
+    def __init__(self, process: int, seconds: float) -> None:
+        self._process, self._deadline = process, time.monotonic() + seconds
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self.is_stuck = False
+        self._thread.start()
+
+    def _look(self) -> None:
+        before, since = "", time.monotonic()
+        while not self._over.wait(_GLANCE):
+            now = time.monotonic()
+            seen = _asleep_at(self._process)
+            if not seen or seen != before:
+                before, since = seen, now
+            self.is_stuck = now - since > PATIENCE_WITH_SLEEP
+            if self.is_stuck or now > self._deadline:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(self._process, signal.SIGKILL)
+                return
+
+    def end(self) -> None:
+        self._over.set()
+        self._thread.join()
 
 
-def allow_forks() -> None:
-    """Say that this process runs a program of this package, whose libraries all outlive a fork."""
-    global _own_program
-    _own_program = True
-
-
-def may_fork() -> bool:
-    """Return whether a fork of this process can read a file: nothing runs here that may hold a lock.
-
-    In a program of another a library may have threads that a fork lacks. Those of numpy end and start around a fork.
-    """
-    is_own = _own_program or bool(typed_or_called("typed"))
-    if sys.platform != "linux" or not is_own or threading.current_thread() is not threading.main_thread():
-        return False
-    return all(
-        thread.name == WAITING or thread is threading.current_thread() for thread in threading.enumerate()
-    )
+def _asleep_at(process: int) -> str:
+    """Return the processor time of a process that sleeps, as the system writes it; empty of one that does not."""
+    try:
+        known = Path(f"/proc/{process}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return " ".join(known[11:13]) if known[0] == "S" else ""
 
 
 def read_in_fork(order: Order) -> Answer | None:
-    """Let a fork of this process read a file; None where it waited, and so says nothing of the file.
+    """Let a fork of this process read a file; None where that says nothing of the file.
 
-    A thread of some library that was lost with the fork may be what it waited for.
+    A lock that a lost thread held is what a fork may wait for. A system may have no room for a fork.
     """
     given = asdict(order)
     import_libraries(given)
     parent = os.getpid()
     answers, answer = os.pipe()
-    with warnings.catch_warnings():
-        # of Python 3.12 and of libraries: that threads are lost
-        warnings.simplefilter("ignore")
-        process = os.fork()
-    if process == 0:
-        try:
-            _leave_all_files(answer)
-            read_and_end(given, parent, _ANSWER)
-        finally:
-            os._exit(1)
-    os.close(answer)
-    late = threading.Timer(PATIENCE * order.seconds + GRACE, os.kill, (process, signal.SIGKILL))
-    late.daemon = True
-    late.start()
+    try:
+        with warnings.catch_warnings():
+            # of Python 3.12 and of libraries: that threads are lost
+            warnings.simplefilter("ignore")
+            process = os.fork()
+    except OSError:
+        os.close(answers)
+        return None
+    else:
+        if process == 0:
+            try:
+                _leave_all_files(answer)
+                read_and_end(given, parent, _ANSWER)
+            finally:
+                os._exit(1)
+    finally:
+        os.close(answer)
+    watch = _Watch(process, PATIENCE * order.seconds + GRACE)
     try:
         with open(answers, "rb") as stream:
             found = received(stream, order.most_bytes)
     finally:
-        late.cancel()
-        late.join()
-        os.kill(process, signal.SIGKILL)  # it has nothing left to do, whatever it does
-        _, status = os.waitpid(process, 0)
+        watch.end()
+        status = _end(process)
     if found is not None:
         return found
-    if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM:
-        return None
+    waited = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM
     ended = how_it_ended(status)
-    return Answer(ended["verdict"], error=ended["error"])
+    return None if waited or watch.is_stuck else Answer(ended["verdict"], error=ended["error"])
+
+
+def _end(process: int) -> int:
+    """End a process that has nothing left to do, whatever it does; return its status, 0 where another took that."""
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, signal.SIGKILL)
+    try:
+        return os.waitpid(process, 0)[1]
+    except ChildProcessError:
+        return 0
 
 
 def _leave_all_files(answer: int) -> None:

@@ -1,8 +1,8 @@
 """Lets a process of its own read a file of a stranger; its answer is JSON and raw bytes, never a pickle.
 
-A library may crash on damaged bytes, never end, or take all memory: `reader_child` is where it does so. A command of
-one thread lets a fork of itself read (`reader_fork`). Elsewhere a server forks: it starts with the first file, serves
-all that follow, and ends by itself when none comes.
+A library may crash on damaged bytes, never end, or take all memory: `reader_child` is where it does so. On Linux a fork
+of this process reads (`reader_fork`). Elsewhere, and where a fork waits in vain, a server does: it starts with the
+first file, serves all that follow, and ends by itself when none comes.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import io
 import json
 import os
 import subprocess
+import sys
 import threading
 from contextlib import suppress
 from dataclasses import asdict
@@ -19,7 +20,8 @@ from pathlib import Path
 
 from vibroimpact.fmus.confinement import PATIENCE
 from vibroimpact.fmus.python_child import python_command
-from vibroimpact.fmus.reader_fork import may_fork, read_in_fork
+from vibroimpact.fmus.reader_child import send
+from vibroimpact.fmus.reader_fork import read_in_fork
 from vibroimpact.fmus.reader_orders import Answer, Order, received
 
 __all__ = ["Answer", "Order", "ReaderServer", "read_apart"]
@@ -28,15 +30,17 @@ __all__ = ["Answer", "Order", "ReaderServer", "read_apart"]
 START_SECONDS = 60.0
 #: What the process may take to end by itself, s.
 STOP_SECONDS = 3.0
+#: Whether a fork reads first; the libraries of macOS are no good after one.
+FORKS = sys.platform == "linux"
 _CHILD = Path(__file__).with_name("reader_child.py")
 
 
 def read_apart(order: Order) -> Answer:
-    """Let a process of its own read a file: a fork of this one where that is sound, else one of the server's.
+    """Let a process of its own read a file: a fork of this one, or where that waits in vain, one of the server's.
 
-    Any number of threads may ask; their files are read one after the other.
+    Any number of threads may ask.
     """
-    answer = read_in_fork(order) if may_fork() else None
+    answer = read_in_fork(order) if FORKS else None
     return answer or _server.ask(order)
 
 
@@ -66,6 +70,7 @@ class ReaderServer:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            bufsize=0,
             env=environment,
         )
 
@@ -75,14 +80,14 @@ class ReaderServer:
         if process is None:
             return None
         assert process.stdin is not None
-        assert isinstance(process.stdout, io.BufferedReader)
+        assert isinstance(process.stdout, io.RawIOBase)
         late = threading.Timer(PATIENCE * order.seconds + START_SECONDS, process.kill)
         late.daemon = True
         late.start()
         try:
-            process.stdin.write(line)
-            process.stdin.flush()
-            answer = received(process.stdout, order.most_bytes)
+            send(process.stdin.fileno(), (line, ()))
+            with open(process.stdout.fileno(), "rb", closefd=False) as stream:
+                answer = received(stream, order.most_bytes)
             if answer is None:  # nothing more that it says would be an answer
                 process.kill()
                 process.wait()
@@ -113,7 +118,12 @@ class ReaderServer:
 
     def forget(self) -> None:
         """Let a process made by `fork` not read the answers of the one that it was made from."""
-        self._lock, self._process = threading.Lock(), None
+        process, self._lock, self._process = self._process, threading.Lock(), None
+        if process is not None:
+            for pipe in (process.stdin, process.stdout):
+                assert pipe is not None
+                pipe.close()
+            process.returncode = 0  # it is no child of this one
 
 
 _server = ReaderServer()

@@ -12,8 +12,6 @@ import sys
 import threading
 from typing import Any
 
-from vibroimpact.fmus.reader_fork import WAITING
-
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a disk, a quota or a limit of files that is full; they pass."""
 SHORT = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOBUFS)
@@ -35,7 +33,7 @@ def begin_as_child() -> None:
     sys.stdout.flush()
     sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    threading.Thread(target=_wait_for_end, name=WAITING, daemon=True).start()
+    threading.Thread(target=_wait_for_end, daemon=True).start()
 
 
 def _wait_for_end() -> None:

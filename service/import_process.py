@@ -14,7 +14,6 @@ from typing import Any
 from vibroimpact.analysis.recording import Recording, write_recording
 from vibroimpact.fmus.confinement import machine_memory
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.fmus.reader_fork import allow_forks
 from vibroimpact.hardware.recordings import import_recording
 from vibroimpact.service.child import FULL, begin_as_child, say
 from vibroimpact.service.memory import import_memory
@@ -44,7 +43,6 @@ def main(arguments: list[str]) -> int:
     """Import the file that the arguments name; return the exit code."""
     file, target, settings = Path(arguments[0]), Path(arguments[1]), json.loads(arguments[2])
     begin_as_child()
-    allow_forks()
     memory = import_memory(machine_memory())
     limit_memory(memory)
     try:

@@ -61,9 +61,7 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
     with naming(path):
         delimiter = "" if own.delimiter is None else DELIMITERS[own.delimiter]
-        raw = read_file(
-            path, delimiter=delimiter, decimal=own.decimal or "", dates=own.dates or ""
-        )
+        raw = read_file(path, delimiter=delimiter, decimal=own.decimal or "", dates=own.dates or "")
         chosen, counted, date = counted_from_start(chosen_tables(raw, own), own.rate)
         tables, joints = joined(chosen)
         pieces = [split_at_restarts(table) for table in tables]

@@ -60,7 +60,7 @@ def probes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str
 
     monkeypatch.setattr(server, "ask", ask)
     monkeypatch.setattr(reader_process, "_server", server)
-    monkeypatch.setattr(reader_process, "may_fork", lambda: False)
+    monkeypatch.setattr(reader_process, "FORKS", False)
     monkeypatch.setattr(probing, "_of_files", {})
     monkeypatch.setattr(probing, "_of_contents", {})
     monkeypatch.setenv("VIBROIMPACT_CACHE", str(tmp_path / "cache"))
@@ -184,7 +184,7 @@ def test_a_killed_program_leaves_no_process_that_reads(tmp_path: Path, reader: C
     code = (
         "import sys; from pathlib import Path; from vibroimpact.analysis import open_dataset\n"
         "from vibroimpact.fmus import reader_process\n"
-        "reader_process.may_fork = lambda: False; reader_process._CHILD = Path(sys.argv[1]); open_dataset(sys.argv[2])"
+        "reader_process.FORKS = False; reader_process._CHILD = Path(sys.argv[1]); open_dataset(sys.argv[2])"
     )
     program = warm.start(code, reader_process._CHILD, path, stdout=None, stderr=None)
     _wait_until(lambda: len(_readers(program.pid)) == 2)
@@ -310,7 +310,7 @@ def test_a_process_made_by_fork_has_a_server_of_its_own(tmp_path: Path) -> None:
     code = (
         "import os, sys; from vibroimpact.analysis.files.probing import check_sound\n"
         "from vibroimpact.fmus import reader_process; _server = reader_process._server\n"
-        "reader_process.may_fork = lambda: False\n"
+        "reader_process.FORKS = False\n"
         "check_sound(sys.argv[1]); child = os.fork()\n"
         "if child == 0:\n    check_sound(sys.argv[2]); _server.close(); os._exit(7)\n"
         "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7; check_sound(sys.argv[3])"

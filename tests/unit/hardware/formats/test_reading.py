@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,20 @@ from vibroimpact.hardware.formats.table import Column, RawFile, Table
 from vibroimpact.hardware.recordings import import_recording
 
 FIELDS = ("label", "unit", "interval", "start", "group", "rails", "attrs", "dated", "doubt")
+
+
+@pytest.fixture(scope="module")
+def server_of_all() -> Iterator[ReaderServer]:
+    server = ReaderServer()
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch, server_of_all: ReaderServer) -> ReaderServer:
+    """Return the server of the tests of this file, in place of that of the process."""
+    monkeypatch.setattr(reader_process, "_server", server_of_all)
+    return server_of_all
 
 
 def same_columns(one: Column, other: Column) -> None:
@@ -55,14 +69,14 @@ def same_files(one: RawFile, other: RawFile) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(whole()))
-@pytest.mark.parametrize("asked", [nullcontext, command_line], ids=["by the server", "by a fork"])
+@pytest.mark.parametrize("forks", [False, True], ids=["by the server", "by a fork"])
 def test_a_file_of_every_format_reads_in_the_other_process_as_here(
-    tmp_path: Path, name: str, asked: Callable[[], AbstractContextManager[None]]
+    tmp_path: Path, name: str, forks: bool, monkeypatch: pytest.MonkeyPatch, server: ReaderServer
 ) -> None:
+    monkeypatch.setattr(reader_process, "FORKS", forks)
     path = tmp_path / name
     path.write_bytes(whole()[name])
-    with asked():
-        same_files(read_file(path), read_raw(path))
+    same_files(read_file(path), read_raw(path))
 
 
 def test_an_error_that_no_reader_foresaw_is_a_refusal_with_the_name_of_the_file(
@@ -79,20 +93,22 @@ def test_an_error_that_no_reader_foresaw_is_a_refusal_with_the_name_of_the_file(
         import_recording([path])
 
 
-def test_a_command_reads_by_a_fork_and_starts_no_python_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.skipif(sys.platform != "linux", reason="no process is forked there")
+@pytest.mark.parametrize("command", [True, False])
+def test_no_python_is_started_anew_to_read_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: bool
 ) -> None:
     """Python, numpy and pint took 1.3 s of processor time, a fork takes 0.02 s."""
     server = ReaderServer()
     monkeypatch.setattr(reader_process, "_server", server)
     path = tmp_path / "record.tdms"
     path.write_bytes(whole()["record.tdms"])
-    done = in_this_process("import", path, "-o", tmp_path / "recording.nc")
-    assert done.returncode == 0, done.stderr
+    if command:
+        done = in_this_process("import", path, "-o", tmp_path / "recording.nc")
+        assert done.returncode == 0, done.stderr
+    else:
+        read_file(path)
     assert server._process is None
-    read_file(path)
-    assert server._process is not None
-    server.close()
 
 
 def test_what_is_one_column_or_array_stays_one_on_its_way() -> None:
@@ -156,10 +172,10 @@ def test_a_file_whose_reading_does_not_end_is_given_up_and_named(
 def test_a_file_that_takes_more_memory_than_its_size_allows_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reading, "MEMORY", 1 << 20)
-    monkeypatch.setattr(reading, "PER_BYTE", 1)
+    monkeypatch.setattr(reading, "MEMORY", 1 << 16)
+    monkeypatch.setattr(reading, "PER_BYTE", 0)
     path = tmp_path / "record.csv"
-    path.write_text("time (s),a\n" + "".join(f"{k / 100},{k}\n" for k in range(100_000)))
+    path.write_text("time (s),a\n" + "".join(f"{k / 100},{k}\n" for k in range(400_000)))
     with pytest.raises(DatasetError, match=r"record\.csv: expected"):
         import_recording([path])
 
