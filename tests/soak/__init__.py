@@ -11,6 +11,9 @@ A kind is a module of this folder whose name does not begin with `_` or `test_`:
     def check(seed: int) -> str | None:
         '''Make the case of this seed and try it; None where all is well, else the problem in one line.'''
 
+Kinds `grammar_*` draw files, documents and requests by the grammar of each format (`_drawn_files`): what is sound is
+read back equal, what is odd in some field or damaged is read or refused in one line.
+
 The case follows from the seed alone. `check` runs in a process of its own in which warnings are errors; the current
 folder is empty, belongs to the case, and is removed with all that is in it (`tempfile` uses it too). An exception,
 a process that dies and one that does not answer are problems as well; the runner says where. One case again, in a
