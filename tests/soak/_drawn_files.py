@@ -27,7 +27,7 @@ from vibroimpact.hardware.recordings import import_recording
 Floats = NDArray[np.float64]
 Drawn = TypeVar("Drawn")
 
-CASES, SAMPLE, SECONDS = 10_000, 3, 10.0
+CASES, SAMPLE, SECONDS = 10_000, 40, 10.0
 MOST_MEMORY = 300_000_000
 """Bytes by which a process may grow while it reads a file of some kilobytes; libraries are loaded before."""
 LONGEST_MESSAGE = 5000

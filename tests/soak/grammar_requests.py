@@ -130,15 +130,14 @@ def _home() -> Path:
 
 
 @functools.cache
-def service() -> tuple[Guarded, Sessions]:
-    """Return an application that nobody runs the jobs of, and its sessions."""
+def service() -> tuple[Guarded, Sessions, Store]:
+    """Return an application that nobody runs the jobs of, its sessions, and its store."""
     folder = _home().absolute() / f"service-{os.getpid()}"
     folder.mkdir(parents=True)
     store, sessions = Store(folder), Sessions(TOKEN)
     shelf = Shelf(RecordingStore(store), FmuStore(folder / "fmus", False))
-    return Guarded(
-        application(store, Supervisor(store), shelf, sessions), TOKEN, sessions, Hosts("127.0.0.1")
-    ), sessions
+    app = application(store, Supervisor(store), shelf, sessions)
+    return Guarded(app, TOKEN, sessions, Hosts("127.0.0.1")), sessions, store
 
 
 def drawn_json(draw: random.Random, depth: int = 3) -> Any:
@@ -222,7 +221,7 @@ async def _asked(app: Guarded, scope: dict[str, Any], body: bytes) -> tuple[int,
 def check(seed: int) -> str | None:
     """Ask one request."""
     draw = random.Random(seed)
-    app, sessions = service()
+    app, sessions, _ = service()
     path = draw.choice(PATHS).replace("ID", draw.choice(("0" * 32, *TEXTS)))
     query = "&".join(
         f"{draw.choice(QUERY)}={quote(draw.choice(TEXTS), errors='replace')}"

