@@ -64,11 +64,12 @@ class Gaps:
         )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def gaps_in(row: NDArray[np.intp], instants: Floats, interval: float | None = None) -> Gaps | None:
     """Return the gaps in the instants of rows, s; None where there are none.
 
     Each run of rows between gaps has a start, averaged over its instants; two starts tell how many samples are
-    missing between their runs, also where the digits of one instant do not.
+    missing between their runs, also where the digits of one instant do not. Steps may differ by any factor.
 
     Parameters
     ----------
@@ -98,6 +99,8 @@ def gaps_in(row: NDArray[np.intp], instants: Floats, interval: float | None = No
         return None
     run = np.append(0, np.cumsum(is_gap))
     starts = instants - row * pace
+    if not np.all(np.isfinite(starts)):
+        return None
     start = np.bincount(run, starts) / np.bincount(run)
     skipped = np.clip(np.rint(np.diff(start) / pace), 0, MOST_SAMPLES).astype(np.intp)
     on_grid = float(np.abs(starts - start[run]).max()) <= _GAP * pace + coarse and bool(np.any(skipped))

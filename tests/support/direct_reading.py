@@ -14,5 +14,5 @@ from vibroimpact.hardware.recordings import import_recording, sources
 
 def imported_directly(path: Path, settings: Mapping[str, Any] | None = None) -> Recording:
     """Import a file; a reader that crashes ends this process."""
-    with patch.object(sources, "read_raw", read_raw):
+    with patch.object(sources, "read_file", read_raw):
         return import_recording([path], settings)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.table import Column, Floats, Table
+from vibroimpact.hardware.recordings.gaps import gaps_in
 from vibroimpact.hardware.recordings.printed_grid import common_step, decimal_step
 from vibroimpact.hardware.recordings.segments import split_at_restarts
 from vibroimpact.hardware.recordings.time_axis import Placement, place
@@ -203,3 +204,9 @@ def test_the_frames_behind_rounded_intervals_are_found(step: float) -> None:
 def test_intervals_on_no_coarser_grid_have_none() -> None:
     intervals = np.round(RANDOM.exponential(0.04, 4000), 3)
     assert common_step(intervals[intervals > 0.0], 1e-3) == 0.0
+
+
+@pytest.mark.parametrize("last", [1e9, 1e300, 1.7e308])
+def test_steps_that_differ_by_any_factor_give_no_warning(last: float) -> None:
+    found = gaps_in(np.arange(5), np.array([0.0, 1e-300, 2e-300, 3e-300, last]))
+    assert found is None or found.missing >= 0
