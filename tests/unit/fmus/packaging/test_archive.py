@@ -1,26 +1,20 @@
 """Bad FMU files: each is one clear message, and nothing is left behind."""
 
 import os
-import re
-import shutil
 import stat
 import zipfile
 import zlib
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 from harness import warm
 
-from vibroimpact.fmus import safe_xml
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging import archive, zip_members
 from vibroimpact.fmus.packaging.archive import binary_path, platforms, unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
-from vibroimpact.fmus.reader_process import Answer, Order
 from vibroimpact.fmus.safe_xml import LARGEST_XML
-from vibroimpact.fmus.shipped import fmu_path
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{t}">
@@ -446,77 +440,4 @@ def test_a_description_above_16_mib_is_refused_before_a_parser_sees_it(
         written(path, {BINARY: b"code", name: content})
     assert path.stat().st_size < 100_000
     assert f"{path}: {name}: expected XML of at most 16777216 bytes, got {len(content)}." in refusal(path)
-    assert unpacked_folders(cache) == []
-
-
-def test_a_parser_gets_a_description_whole() -> None:
-    """In pieces a token of 16 MiB takes fifteen times as long."""
-    given: list[int] = []
-
-    class Parser:
-        def Parse(self, content: bytes, last: bool) -> None:
-            given.append(len(content))
-            assert last
-
-    content = b"<a>" + b" " * 1_000_000 + b"</a>"
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(safe_xml.expat, "ParserCreate", lambda **_: Parser())
-        patched.setattr(safe_xml, "TreeBuilder", Mock)
-        safe_xml.root_of(content, "a.xml")
-    assert given == [len(content)]
-    with pytest.raises(ComponentFileError, match=r"a\.xml: expected XML of at most"):
-        safe_xml.root_of(bytes(LARGEST_XML + 1), "a.xml")
-
-
-@pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return the readers of files that the other process is asked for from now on."""
-    readers = []
-    original = archive.read_apart
-
-    def read_apart(order: Order) -> Answer:
-        readers.append(order.reader)
-        return original(order)
-
-    monkeypatch.setattr(archive, "read_apart", read_apart)
-    return readers
-
-
-def test_a_foreign_description_is_read_by_a_process_of_its_own_once(tmp_path: Path, asked: list[str]) -> None:
-    path = written(tmp_path / "M.fmu")
-    for _ in range(2):
-        unpack(path)
-        read_description(path)
-    assert asked == ["vibroimpact.fmus.packaging.description_check:read"]
-    unpack(path.rename(tmp_path / "renamed.fmu"))
-    assert len(asked) == 1
-
-
-def test_components_of_the_package_are_known_by_their_content(tmp_path: Path, asked: list[str]) -> None:
-    copy = tmp_path / "renamed.fmu"
-    shutil.copy(fmu_path("Oscillator"), copy)
-    unpack(copy)
-    assert asked == []
-    with zipfile.ZipFile(copy, "a") as file:
-        file.writestr("more.txt", "changed")
-    unpack(copy)
-    assert len(asked) == 1
-
-
-@pytest.mark.parametrize(
-    ("answer", "said"),
-    [
-        (Answer("late"), "expected XML that can be read, got one that the library had not read after 10 s"),
-        (Answer("died", error="11"), r"got one that crashes the library which reads it \(SIGSEGV\)"),
-        (Answer("raised", error="MemoryError"), "got MemoryError"),
-    ],
-)
-def test_a_description_that_its_reader_does_not_survive_is_refused_and_not_kept(
-    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, answer: Answer, said: str
-) -> None:
-    monkeypatch.setattr(archive, "read_apart", lambda order: answer)
-    path = written(tmp_path / "M.fmu")
-    message = refusal(path)
-    assert message.startswith(f"{path}: modelDescription.xml: ")
-    assert re.search(said, message)
     assert unpacked_folders(cache) == []
