@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,7 +25,13 @@ END = "</ModelVariables><ModelStructure/></fmiModelDescription>"
 @pytest.fixture
 def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FmuStore:
     monkeypatch.setenv("VIBROIMPACT_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(fmpy_door, "read_model_description", None)  # in this process
+    read, here = fmpy_door.read_model_description, os.getpid()
+
+    def read_elsewhere(*arguments: Any, **options: Any) -> Any:
+        assert os.getpid() != here
+        return read(*arguments, **options)
+
+    monkeypatch.setattr(fmpy_door, "read_model_description", read_elsewhere)
     return FmuStore(tmp_path / "fmus", takes_uploads=True)
 
 
