@@ -6,9 +6,9 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.given import PathLike, SceneLike, given_result, scene_with_modes
-from vibroimpact.orchestrator.study import BUDGET, dataset_of, refuse_unreached, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import BUDGET, dataset_of, refuse_unreached, study_accuracy
+from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
 from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
-from vibroimpact.orchestrator.study.refusals import refuse_misuse
 
 
 def accuracy(

@@ -21,10 +21,10 @@ from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.ssp import opened_scene
-from vibroimpact.orchestrator.study import Measured, Study, dataset_of, study_accuracy
-from vibroimpact.orchestrator.study.choice import advice, error_of_reference, refuse_unreached
-from vibroimpact.orchestrator.study.refusals import refuse_misuse
-from vibroimpact.orchestrator.study.tuned import tuned_text
+from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy.choice import advice, error_of_reference, refuse_unreached
+from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
+from vibroimpact.orchestrator.study.accuracy.tuned import tuned_text
 
 MEGABYTE = 1e6
 WIDE = 120

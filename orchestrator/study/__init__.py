@@ -1,9 +1,4 @@
-"""Measured studies of a scene: what accuracy costs in time."""
+"""Measured studies of a scene: `accuracy` is what accuracy costs in time, `effects` what each effect costs and changes.
 
-from __future__ import annotations
-
-from vibroimpact.orchestrator.study.accuracy import BUDGET, dataset_of, study_accuracy
-from vibroimpact.orchestrator.study.choice import advice, refuse_unreached
-from vibroimpact.orchestrator.study.measured import Measured, Study
-
-__all__ = ["BUDGET", "Measured", "Study", "advice", "dataset_of", "refuse_unreached", "study_accuracy"]
+`ways` are the ways in which a scene can be simulated, `preparation` finds out how many modes it takes.
+"""

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.memory import memory_of_ways
-from vibroimpact.orchestrator.study.replays import ReplayTrial
-from vibroimpact.orchestrator.study.way import CallCounter, SceneTrial, Trial, Way
+from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
+from vibroimpact.orchestrator.study.ways.way import CallCounter, SceneTrial, Trial, Way
 
 
 class Clock:

@@ -37,9 +37,9 @@ from vibroimpact.orchestrator.study.motion import (
 )
 from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.references import disturbed_scenes, observed, scales_of
-from vibroimpact.orchestrator.study.replays import ReplayTrial
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
-from vibroimpact.orchestrator.study.way import SceneTrial, opened_trial
+from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
+from vibroimpact.orchestrator.study.ways.way import SceneTrial, opened_trial
 
 PAIRS = 5
 """Pairs of runs, one with the effect and one without, in turn."""

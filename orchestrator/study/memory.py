@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.way import Way
-from vibroimpact.orchestrator.study.ways import ways_of
+from vibroimpact.orchestrator.study.ways.all_ways import ways_of
+from vibroimpact.orchestrator.study.ways.way import Way
 
 UNKNOWN = -1
 """Where nobody measures it."""

@@ -23,9 +23,9 @@ from vibroimpact.orchestrator.scene.models import (
 )
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
-from vibroimpact.orchestrator.study.replays import span_of
-from vibroimpact.orchestrator.study.strangers import contact_masses
-from vibroimpact.orchestrator.study.way import opened_trial
+from vibroimpact.orchestrator.study.ways.replays import span_of
+from vibroimpact.orchestrator.study.ways.strangers import contact_masses
+from vibroimpact.orchestrator.study.ways.way import opened_trial
 
 DISTURBANCE = 1e-9
 """Relative change of a number of the scene by which the sensitivity of its motion is measured."""

@@ -34,11 +34,11 @@ from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 from vibroimpact.orchestrator.scene.models import HertzStop, KelvinVoigtStop, RestitutionStop
-from vibroimpact.orchestrator.study.accuracy import studied_scene
+from vibroimpact.orchestrator.study.accuracy.study import studied_scene
 from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.references import observed, scales_of
-from vibroimpact.orchestrator.study.ways import ways_of
+from vibroimpact.orchestrator.study.ways.all_ways import ways_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TOLERANCE = 1e-6

@@ -24,7 +24,7 @@ from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene, load_scene
-from vibroimpact.orchestrator.study.way import CallCounter
+from vibroimpact.orchestrator.study.ways.way import CallCounter
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PERIODS = 4_000

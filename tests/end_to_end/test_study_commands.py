@@ -14,7 +14,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_measured
 from vibroimpact.orchestrator.commands.accuracy import _shown
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study import study_accuracy
+from vibroimpact.orchestrator.study.accuracy import study_accuracy
 
 FREE = """# rings down
 [body]

@@ -12,7 +12,7 @@ from support.exact_modes import beam_root, beam_shape
 
 import vibroimpact as vi
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy import studied_scene
+from vibroimpact.orchestrator.study.accuracy.study import studied_scene
 from vibroimpact.orchestrator.study.references import reference_of
 
 

@@ -9,7 +9,7 @@ import mmap
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.study.memory import memory_in_fork
 from vibroimpact.orchestrator.study.observation import Observation
-from vibroimpact.orchestrator.study.way import Trial, Way
+from vibroimpact.orchestrator.study.ways.way import Trial, Way
 
 
 class OfC:

@@ -10,8 +10,8 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study import clock
 from vibroimpact.orchestrator.study.clock import Clock
 from vibroimpact.orchestrator.study.observation import Observation
-from vibroimpact.orchestrator.study.replays import ReplayTrial
-from vibroimpact.orchestrator.study.way import SceneTrial, Trial, Way
+from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
+from vibroimpact.orchestrator.study.ways.way import SceneTrial, Trial, Way
 
 RUN = 1e-3
 """Time that each run is said to take, s."""

@@ -20,8 +20,8 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
 from vibroimpact.orchestrator.study.observation import Observation
-from vibroimpact.orchestrator.study.trials import ROWS_A_PERIOD
-from vibroimpact.orchestrator.study.ways import INTEGRATOR_TOLERANCES
+from vibroimpact.orchestrator.study.ways.all_ways import INTEGRATOR_TOLERANCES
+from vibroimpact.orchestrator.study.ways.trials import ROWS_A_PERIOD
 
 ROWS = (1.0, 16.0, 256.0)
 """Rows of co-simulation in a period."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from peers.problems import Problem
 from peers.ways import Clock, Found, Run, Way, observed
-from vibroimpact.orchestrator.study.equal_restitution import damping_ratio_of
+from vibroimpact.orchestrator.study.ways.equal_restitution import damping_ratio_of
 
 STEPS_A_PERIOD = (500.0, 5_000.0)
 CONTACT_STEPS = 10.0

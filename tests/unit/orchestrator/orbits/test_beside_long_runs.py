@@ -13,7 +13,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.fmus.core.modes import chain_modes
 from vibroimpact.orchestrator.orbits.follow import Followed, follow_branches
-from vibroimpact.orchestrator.study.equal_restitution import laws_of_equal_restitution
+from vibroimpact.orchestrator.study.ways.equal_restitution import laws_of_equal_restitution
 
 FREQUENCY = "forcing.angular_frequency"
 LONG = {

@@ -16,7 +16,7 @@ from vibroimpact.orchestrator.run.many_points.loop import loop_of
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 from vibroimpact.orchestrator.study.observation import observation_of
-from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
+from vibroimpact.orchestrator.study.ways.trials import CoupledTrial, ModelExchangeTrial
 
 OPEN_HERTZ = """[body]
 mass = 1.0

@@ -20,17 +20,18 @@ from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.commands.accuracy import table_of
 from vibroimpact.orchestrator.scene import Scene, load_scene
-from vibroimpact.orchestrator.study import Measured, Study, advice, dataset_of, study_accuracy, ways
-from vibroimpact.orchestrator.study.accuracy import studied_scene
-from vibroimpact.orchestrator.study.choice import cheapest, error_of_reference, refuse_unreached
+from vibroimpact.orchestrator.study.accuracy import Measured, Study, advice, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy.choice import cheapest, error_of_reference, refuse_unreached
+from vibroimpact.orchestrator.study.accuracy.study import studied_scene
 from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.memory import IS_MEASURED, memory_of_ways
-from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.references import Reference, reference_of
-from vibroimpact.orchestrator.study.revision import RevisedTrial
-from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
-from vibroimpact.orchestrator.study.way import Trial
-from vibroimpact.orchestrator.study.ways import remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways import all_ways
+from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways.plain_steps import PlainForcesTrial, PlainStepsTrial
+from vibroimpact.orchestrator.study.ways.revision import RevisedTrial
+from vibroimpact.orchestrator.study.ways.trials import CoupledTrial, ModelExchangeTrial
+from vibroimpact.orchestrator.study.ways.way import Trial
 
 P11: dict[str, Any] = {
     "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
@@ -57,7 +58,7 @@ def studied_once(scene: Scene, settings: dict[str, Any] = COARSE, **options: Any
     with pytest.MonkeyPatch.context() as patch:
         stop_the_clock(patch)
         for name, values in settings.items():
-            patch.setattr(ways, name, values)
+            patch.setattr(all_ways, name, values)
         return study_accuracy(scene, budget=NEVER_LATE, **options)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import vibroimpact as vi
 from vibroimpact.orchestrator.scene.models import HuntCrossleyStop, KelvinVoigtStop, RestitutionStop
-from vibroimpact.orchestrator.study.equal_restitution import (
+from vibroimpact.orchestrator.study.ways.equal_restitution import (
     LEAST_RESTITUTION,
     contact_time,
     damping_ratio_of,

@@ -8,7 +8,7 @@ import pytest
 
 import vibroimpact as vi
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy import studied_scene
+from vibroimpact.orchestrator.study.accuracy.study import studied_scene
 from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import observed, scales_of
 

@@ -284,8 +284,8 @@ def test_a_study_of_accuracy_tells_other_numbers_of_modes_by_the_most(
 ) -> None:
     stop_the_clock(monkeypatch)
     for slow in ("_coupled", "_revised", "_integrated"):  # which are not asked about
-        monkeypatch.setattr(f"vibroimpact.orchestrator.study.ways.{slow}", lambda scene: [])
-    monkeypatch.setattr("vibroimpact.orchestrator.study.ways.STEPS_A_PERIOD", (23,))
+        monkeypatch.setattr(f"vibroimpact.orchestrator.study.ways.all_ways.{slow}", lambda scene: [])
+    monkeypatch.setattr("vibroimpact.orchestrator.study.ways.all_ways.STEPS_A_PERIOD", (23,))
     found = vi.accuracy(strip(**{"record.recorded_periods": 5}), budget=NEVER_LATE)
     assert "32 modes, residual vectors among them" in found.attrs["modes_reference"]
     modes = found.where(found.name == "modes", drop=True)

@@ -13,9 +13,9 @@ from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.replay import opened_replays
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import Study, advice, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.effects import effects_of, shares_of
-from vibroimpact.orchestrator.study.replays import ReplayTrial, rates_of, thinned
+from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of, thinned
 
 TIME = 2e-5 * np.arange(1500)
 TRUTH = {"body.modes": 4}

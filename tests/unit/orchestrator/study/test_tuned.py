@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.orchestrator.study.tuned import tuned_text
+from vibroimpact.orchestrator.study.accuracy.tuned import tuned_text
 
 BODY = "# a rig\n[body]\nmass = 1.0  # kg\n"
 

@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.observation import LATE, Observation
-from vibroimpact.orchestrator.study.strangers import stranger_of
+from vibroimpact.orchestrator.study.ways.strangers import stranger_of
 
 
 class RevisedTrial:

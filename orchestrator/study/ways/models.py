@@ -8,16 +8,15 @@ from dataclasses import replace
 from typing import Any
 
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.models import RestitutionStop, Stop
-from vibroimpact.orchestrator.study.equal_restitution import (
+from vibroimpact.orchestrator.study.ways.equal_restitution import (
     LEAST_RESTITUTION,
     contact_time,
     laws_of_equal_restitution,
     restitution_at,
 )
-from vibroimpact.orchestrator.study.references import scales_of
-from vibroimpact.orchestrator.study.way import Way, can_have, time_scale, way_by_scene
+from vibroimpact.orchestrator.study.ways.way import Way, can_have, time_scale, way_by_scene
 
 CONTACT_TIMES = (1e-1, 1e-2, 1e-3)
 """Of yielding stops that stand for a rigid one, over the period."""
@@ -45,7 +44,7 @@ def other_models(scene: Scene, speed: float) -> list[Way]:
         change = {"body.impact_projection": other}
         ways.append(way_by_scene(f"{other} projection", "", math.nan, scene, change, model=True))
     if not isinstance(body, BeamBody) and scene.stops:
-        ways += _equal_restitution(scene, speed)
+        ways += _equal_restitution(scene, body, speed)
     return ways
 
 
@@ -111,10 +110,10 @@ def told_by(ways: Sequence[Way]) -> str:
     return f"{finest.size} modes{what}"
 
 
-def _equal_restitution(scene: Scene, speed: float) -> Iterator[Way]:
+def _equal_restitution(scene: Scene, body: OscillatorBody | ChainBody, speed: float) -> Iterator[Way]:
     """Yield stops of other laws that give the mass that hits them the same coefficient of restitution."""
     stops: Sequence[Stop] = scene.stops
-    masses = scales_of(scene).masses
+    masses = [body.mass_at(stop.mass) for stop in stops]
     if not speed > 0.0:
         speed = 1.0  # at which nothing hits: of a law that depends on it, any
     found = [restitution_at(stop, mass, speed) for stop, mass in zip(stops, masses, strict=True)]

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
-from vibroimpact.orchestrator.study.measured import Measured, Study
 from vibroimpact.orchestrator.study.references import Reference
 
 VAGUE = 1e-2

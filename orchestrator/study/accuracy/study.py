@@ -18,13 +18,17 @@ from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.accuracy.choice import advice, cheapest, error_of_reference, pareto_front
+from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
+from vibroimpact.orchestrator.study.accuracy.refusals import (
+    refuse_misuse,
+    refuse_one_way,
+    refuse_vague_reference,
+)
 from vibroimpact.orchestrator.study.balance import balance_of
-from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
-from vibroimpact.orchestrator.study.measured import Measured, Study
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.memory import UNKNOWN
-from vibroimpact.orchestrator.study.models import told_by
 from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import (
     DISTURBANCE,
@@ -35,15 +39,11 @@ from vibroimpact.orchestrator.study.references import (
     scales_of,
     sensitivity_of,
 )
-from vibroimpact.orchestrator.study.refusals import (
-    refuse_misuse,
-    refuse_one_way,
-    refuse_vague_reference,
-)
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
-from vibroimpact.orchestrator.study.trials import far_off
-from vibroimpact.orchestrator.study.way import Trial, Way
-from vibroimpact.orchestrator.study.ways import remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways.models import told_by
+from vibroimpact.orchestrator.study.ways.trials import far_off
+from vibroimpact.orchestrator.study.ways.way import Trial, Way
 
 BUDGET = 40.0
 """Wall time of a study, s, where nobody says another."""

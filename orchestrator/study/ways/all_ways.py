@@ -13,14 +13,14 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, RestitutionStop
-from vibroimpact.orchestrator.study.models import other_models, other_modes
-from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
-from vibroimpact.orchestrator.study.replays import ReplayTrial, rates_of
-from vibroimpact.orchestrator.study.revision import RevisedTrial
-from vibroimpact.orchestrator.study.sampled import SampledTrial
-from vibroimpact.orchestrator.study.strangers import why_not_pushed, why_not_thrown_back
-from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
-from vibroimpact.orchestrator.study.way import Opener, Trial, Way, time_scale, way_by_scene
+from vibroimpact.orchestrator.study.ways.models import other_models, other_modes
+from vibroimpact.orchestrator.study.ways.plain_steps import PlainForcesTrial, PlainStepsTrial
+from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of
+from vibroimpact.orchestrator.study.ways.revision import RevisedTrial
+from vibroimpact.orchestrator.study.ways.sampled import SampledTrial
+from vibroimpact.orchestrator.study.ways.strangers import why_not_pushed, why_not_thrown_back
+from vibroimpact.orchestrator.study.ways.trials import CoupledTrial, ModelExchangeTrial
+from vibroimpact.orchestrator.study.ways.way import Opener, Trial, Way, time_scale, way_by_scene
 
 CONTACT_TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 INTEGRATOR_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)

@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.study.observation import Observation, observation_of
-from vibroimpact.orchestrator.study.replays import ReplayTrial
+from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
 
 
 class Trial(Protocol):

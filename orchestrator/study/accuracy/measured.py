@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.study.errors import Errors
 from vibroimpact.orchestrator.study.observation import LATE
 from vibroimpact.orchestrator.study.references import Reference
 from vibroimpact.orchestrator.study.statistics import Statistics
-from vibroimpact.orchestrator.study.way import Way
+from vibroimpact.orchestrator.study.ways.way import Way
 
 
 @dataclass(slots=True)

@@ -9,10 +9,10 @@ from numbers import Real
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.choice import error_of_reference
+from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
 from vibroimpact.orchestrator.study.errors import QUANTITIES
 from vibroimpact.orchestrator.study.references import ROUNDING, SAFETY, Reference
-from vibroimpact.orchestrator.study.way import Way
+from vibroimpact.orchestrator.study.ways.way import Way
 
 LEAST_TOLERANCE = SAFETY * ROUNDING
 """Relative error, 1.4e-14, below which no reference of double precision is known: each counts so much for rounding."""

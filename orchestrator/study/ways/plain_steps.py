@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.run.record import DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.models import RestitutionStop
 from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
-from vibroimpact.orchestrator.study.strangers import stranger_of, thrown_back
+from vibroimpact.orchestrator.study.ways.strangers import stranger_of, thrown_back
 
 
 class _Seen:
