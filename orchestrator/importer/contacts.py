@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.pairs.pair import Pair, Pairs
+from vibroimpact.orchestrator.importer.pairs.all_pairs import Pairs
+from vibroimpact.orchestrator.importer.pairs.pair import Pair
 from vibroimpact.orchestrator.importer.pairs.rigid_stops import RigidStop
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import (

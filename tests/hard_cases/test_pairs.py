@@ -144,7 +144,7 @@ def test_two_that_meet_a_third_at_once_are_resolved_by_the_rule() -> None:
 
 
 def test_impulses_that_never_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vibroimpact.orchestrator.importer.pairs.pair.MOST_IMPULSES", 2)
+    monkeypatch.setattr("vibroimpact.orchestrator.importer.pairs.all_pairs.MOST_IMPULSES", 2)
     run = cradle({0: -0.1})
     with pytest.raises(ComponentError, match=r"expected impacts that end, got 2 at time 1\.57"):
         run.at(2.0)

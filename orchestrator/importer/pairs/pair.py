@@ -12,13 +12,10 @@ until none closes: docs/equations.md 3.5.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-import numpy as np
-
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.pairs.ends import (
     BodyRate,
@@ -26,13 +23,11 @@ from vibroimpact.orchestrator.importer.pairs.ends import (
     PairEnd,
     PortEnd,
     Scale,
-    end_of,
     precision_at,
 )
 from vibroimpact.orchestrator.importer.pairs.force import PairForce
 from vibroimpact.orchestrator.importer.pairs.meeting import MeetingSearch
 from vibroimpact.orchestrator.importer.specification import PairSpec
-from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
 #: Likewise of bodies that rest on each other, whose force makes up for less.
@@ -41,14 +36,10 @@ HIT_AT_REST = 1e-4
 SUNK = 100.0
 #: Likewise, at any time, by this part of the largest displacement.
 DEEP = 1e-3
-#: Impulses at one instant.
-MOST_IMPULSES = 10_000
 #: A step is at most this part of the shortest period of a body that says its own.
 PART_OF_PERIOD = 0.125
 #: A step of two bodies that rest on each other is this much shorter again.
 RESTING_STEPS = 16.0
-#: Forces of bodies at rest agree to this, relative to the largest.
-REST_TOLERANCE = 1e-10
 #: Bounces still to come that take less than this part of the longest one are summed to their end.
 ACCUMULATED = 1e-3
 #: A bounce whose closing speed times its duration is below this times the distance of touching is none.
@@ -379,126 +370,3 @@ class Pair:
         left = flight * self.restitution / (1.0 - self.restitution)
         low = now.closing * flight < LOW * self._scale.room(time)
         return low or (shrinks and left < ACCUMULATED * longest)
-
-
-class Pairs:
-    """All pairs of bodies of an importer that hit each other.
-
-    Attributes
-    ----------
-    specified : list of Pair
-        In the order of their specifications.
-    pairs : list of Pair
-        These, and the bodies of other tools at the rigid stops of the run.
-    scale : Scale
-        What is small beside the motion of any of them.
-    pulses : Pulses
-        The impulses of bodies of other tools.
-    """
-
-    def __init__(
-        self,
-        components: Mapping[str, Component],
-        specs: Sequence[PairSpec],
-        inputs: dict[tuple[str, str], ForceInput],
-    ) -> None:
-        self.scale = Scale()
-        self.pulses = Pulses(components)
-        self.specified = []
-        for spec in specs:
-            impulses = self.pulses if spec.law == "restitution" else None
-            lower, upper = (end_of(components, end, inputs, impulses) for end in (spec.lower, spec.upper))
-            self.specified.append(Pair(spec, lower, upper, self.scale, self.pulses))
-        self.pairs = self.specified
-
-    def begin(self, time: float, stops: Sequence[Pair] = ()) -> None:
-        """Start a run: initialization has ended, and these are its rigid stops."""
-        self.scale.displacement = self.scale.speed = 0.0
-        self.pulses.begin()
-        self.pairs = [*self.specified, *stops]
-        bodies = {body.name: body for pair in self.pairs for body in pair.bodies}
-        self._instances = [
-            body.instance
-            for body in bodies.values()
-            if body.event_mode and isinstance(body.instance, Instance3)
-        ]
-        for pair in self.pairs:
-            pair.look()
-        for pair in self.pairs:
-            pair.begin(time)
-
-    def __bool__(self) -> bool:
-        """Is there any pair?"""
-        return bool(self.pairs)
-
-    def resolve(self, time: float) -> list[str]:
-        """Give the impulses of the instant `time`, s, if there are any.
-
-        Returns
-        -------
-        bodies : list of str
-            The lower body of each impact.
-
-        Raises
-        ------
-        ComponentError
-            The impulses do not end, or bodies are pressed together.
-        """
-        hit: list[str] = []
-        if not any(pair.is_due(pair.look(), time) for pair in self.pairs):
-            return hit
-        self.pulses.measure(time)
-        for instance in self._instances:
-            instance.check(instance.enter_event_call(), "EnterEventMode")
-        met = {pair for pair in self.pairs if pair.is_due(pair.look(), time)}
-        for _ in range(MOST_IMPULSES):
-            due = [(now.closing, pair, now) for pair in self.pairs if pair.is_due(now := pair.look(), time)]
-            if not due:
-                break
-            closing, pair, now = max(due, key=lambda found: found[0])
-            if pair.is_pressed(now, time):
-                raise pair.pressed_error(time)
-            pair.strike(now, time, is_first=pair in met)
-            met.discard(pair)
-            if closing > self.scale.slow:
-                hit.append(pair.struck.name)
-        else:
-            raise self._endless(time)
-        for instance in self._instances:
-            instance.check(instance.enter_step_call(), "EnterStepMode")
-        return hit
-
-    def rest_end(self, time: float, end: float) -> float | None:
-        """Make the forces of all bodies at rest agree; returns where to repeat the step to, s, or None."""
-        resting = [pair for pair in self.pairs if pair.rests]
-        if not resting or not end > time:
-            return None
-        size = end - time
-        mobility = np.array([[a.mobility(b) for b in resting] for a in resting])
-        change = np.linalg.lstsq(mobility, [pair.excess(size) for pair in resting], rcond=None)[0] / size
-        largest = max(abs(pair.force) for pair in resting)
-        if np.abs(change).max() > REST_TOLERANCE * largest:
-            for pair, more in zip(resting, change, strict=True):
-                pair.force += float(more)
-            return end
-        weakest = min(resting, key=lambda pair: pair.force)
-        if weakest.force < 0.0:
-            weakest.stop_resting()
-            return end
-        return None
-
-    def _endless(self, time: float) -> ComponentError:
-        names = ", ".join(pair.name for pair in self.pairs if pair.is_due(pair.look(), time))
-        return ComponentError(
-            f"{names}: expected impacts that end, got {MOST_IMPULSES} at time {time:.17g}. "
-            "Use a law that yields: kelvin_voigt, hertz or hunt_crossley.",
-            instance=self.pairs[0].lower.body.name,
-            time=time,
-        )
-
-    def free(self) -> None:
-        """Give back what trials have saved, before the bodies are freed."""
-        self.pulses.free()
-        for pair in self.specified:
-            pair.lower.free()
-            pair.upper.free()

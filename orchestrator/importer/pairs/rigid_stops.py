@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.pairs.all_pairs import Pairs
 from vibroimpact.orchestrator.importer.pairs.ends import Motion, PointEnd, SurfaceEnd
-from vibroimpact.orchestrator.importer.pairs.pair import Pair, Pairs
+from vibroimpact.orchestrator.importer.pairs.pair import Pair
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
 from vibroimpact.orchestrator.importer.stop_contacts.held_force import HeldForceBond
