@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -53,20 +55,55 @@ class DeadlineReached(RunEnded):
     """A run took longer than its deadline."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Limit:
+    """What the runs of a block are given up by: a clock, and the most that one of them takes, s."""
+
+    clock: Callable[[], float] = time.perf_counter
+    most: float = math.inf
+
+
+_UNLIMITED = _Limit()
+_LIMIT: ContextVar[_Limit] = ContextVar("limit of runs")
+
+
+@contextmanager
+def runs_limited(most: float, clock: Callable[[], float]) -> Iterator[None]:
+    """Give up each run of this thread that takes longer than `most` seconds of a clock.
+
+    Deadlines of scenes count by that clock, too. Runs in other processes do not hear of it.
+
+    Parameters
+    ----------
+    most : float
+        s.
+    clock : callable
+        Returns the time since some instant, s: `time.process_time` for processor time.
+    """
+    before = _LIMIT.set(_Limit(clock, most))
+    try:
+        yield
+    finally:
+        _LIMIT.reset(before)
+
+
 class Deadline:
-    """The wall time at which a run is given up."""
+    """The time at which a run is given up: wall time, or that of the clock of `runs_limited`."""
 
     def __init__(self) -> None:
         self.begin(None)
 
     def begin(self, seconds: float | None) -> None:
         """Give the run that begins so many seconds; None: as long as it takes."""
-        self._end = math.inf if seconds is None else time.perf_counter() + seconds
+        limit = _LIMIT.get(_UNLIMITED)
+        most = limit.most if seconds is None else min(seconds, limit.most)
+        self._now = limit.clock
+        self._end = math.inf if most == math.inf else self._now() + most
 
     @property
     def is_over(self) -> bool:
         """Whether the time is over."""
-        return time.perf_counter() > self._end
+        return self._now() > self._end
 
     def refuse_late(self) -> None:
         """Raise DeadlineReached when the time is over."""
@@ -80,7 +117,7 @@ class Deadline:
     @property
     def watcher(self) -> StepWatcher:
         """What looks on at the steps of an importer."""
-        return StepWatcher(self.look_on, lambda time, end: None, lambda: self._end - time.perf_counter())
+        return StepWatcher(self.look_on, lambda time, end: None, lambda: self._end - self._now())
 
 
 def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -49,6 +49,8 @@ class Observation:
         Why there is no result, or what is wrong with it; empty where it is one.
     variance : float
         Least variance accounted for among the channels that a replay is compared with, percent; else NaN.
+    reached : float
+        How far a run came that was given up, over its whole time; NaN where the way does not tell.
     held : OrbitClass
         `sticking` where impacts are without number (a complete chatter, or a rest on a stop), `rest` where the body
         rests for good, else `unknown`; the class of the run goes by it.
@@ -65,6 +67,7 @@ class Observation:
     seconds: float = math.nan
     failure: str = ""
     variance: float = math.nan
+    reached: float = math.nan
     held: OrbitClass = OrbitClass.unknown
 
     @property

@@ -13,7 +13,6 @@ import numpy as np
 from vibroimpact.analysis.landmarks import ImpactOscillator
 from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.orchestrator.run.parameters import float_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
@@ -24,6 +23,7 @@ from vibroimpact.orchestrator.scene.models import (
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 from vibroimpact.orchestrator.study.ways.replays import span_of
+from vibroimpact.orchestrator.study.ways.span import first_part, window_of
 from vibroimpact.orchestrator.study.ways.strangers import contact_masses
 from vibroimpact.orchestrator.study.ways.way import opened_trial
 
@@ -109,15 +109,17 @@ def sensitivity_of(scene: Scene, scales: Scales) -> float:
     return max((change.worst() for change in changes), default=math.nan) / DISTURBANCE
 
 
-def scales_of(scene: Scene) -> Scales:
-    """Return what errors of a scene are relative to."""
+def scales_of(scene: Scene, part: float = 1.0) -> Scales:
+    """Return the scales of the errors of a scene, or of the first part of its time."""
+    if scene.general is not None or scene.replay is not None:
+        scene = first_part(scene, part)
     if scene.general is not None:
         begin = scene.record.transient_time
         return Scales(scene.record.recorded_time, (begin, begin + scene.record.recorded_time))
     if scene.replay is not None:
         begin, end = span_of(scene)
         return Scales(end - begin, (begin, end))
-    window = recorded_window(scene, float_parameters(scene, None))
+    window = window_of(scene, float_parameters(scene, None), part)
     body = scene.body
     masses = () if isinstance(body, BeamBody) else tuple(body.mass_at(stop.mass) for stop in scene.stops)
     return Scales(scene.period or window[1] - window[0], window, masses)

@@ -35,7 +35,7 @@ def memories_of_c(sizes: list[int]) -> list[int]:
 
 
 def _way_of(size: int) -> Way:
-    def opened(wrap: Wrapper | None) -> Trial:
+    def opened(wrap: Wrapper | None, part: float = 1.0) -> Trial:
         return OfC(size)
 
     return Way("of C", "", math.nan, {}, opened)

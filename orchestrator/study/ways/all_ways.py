@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.point import recorded_window
@@ -108,8 +109,12 @@ def _remarks_on_strangers(scene: Scene) -> list[str]:
 
 
 def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
-    """Return what opens a kind of trial with these arguments, given a wrapper of the functions of FMUs."""
-    return lambda wrap: kind(*arguments, wrap=wrap)
+    """Return what opens a kind of trial with these arguments."""
+
+    def opened(wrap: Wrapper | None, part: float = 1.0) -> Trial:
+        return kind(*arguments, wrap=wrap, part=part)
+
+    return opened
 
 
 def _fused(scene: Scene) -> list[Way]:
@@ -165,7 +170,10 @@ def _fewer_samples(scene: Scene) -> list[Way]:
 
 
 def _opens_replay(scene: Scene, every: int) -> Opener:
-    return lambda wrap: ReplayTrial(scene, every)
+    def opened(wrap: Wrapper | None, part: float = 1.0) -> Trial:
+        return ReplayTrial(scene, every, part)
+
+    return opened
 
 
 def _revised(scene: Scene) -> list[Way]:

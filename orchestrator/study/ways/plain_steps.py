@@ -12,11 +12,11 @@ from vibroimpact.orchestrator.importer.component import Component, Value
 from vibroimpact.orchestrator.run.coupled import stop_of, stop_parameters
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
-from vibroimpact.orchestrator.run.record import DeadlineReached
+from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.models import RestitutionStop
 from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
+from vibroimpact.orchestrator.study.ways.span import window_of
 from vibroimpact.orchestrator.study.ways.strangers import stranger_of, thrown_back
 
 
@@ -38,11 +38,17 @@ class _Seen:
         if now > self._begin:
             self.impacts.append((now, abs(velocity), stop + 1.0))
 
-    def observation(self, final: tuple[float, float], began: float, failure: str) -> Observation:
+    def observation(
+        self, final: tuple[float, float], began: float, failure: str, reached: float
+    ) -> Observation:
         """Return it as what a run shows."""
         found = np.array(self.impacts).reshape(-1, 3)
-        seconds = time.perf_counter() - began
-        return Observation(found, self.lowest, self.highest, final, seconds=seconds, failure=failure)
+        return Observation(
+            *(found, self.lowest, self.highest, final),
+            seconds=time.perf_counter() - began,
+            failure=failure,
+            reached=reached,
+        )
 
 
 class PlainStepsTrial:
@@ -59,10 +65,13 @@ class PlainStepsTrial:
         Its size, s.
     wrap : callable or None
         Wraps the functions of the FMU.
+    part : float
+        Part of the scene's time that is simulated.
     """
 
-    def __init__(self, scene: Scene, step: float, wrap: Wrapper | None = None) -> None:
-        self._scene, self._step = scene, step
+    def __init__(self, scene: Scene, step: float, wrap: Wrapper | None = None, part: float = 1.0) -> None:
+        self._scene, self._step, self._part = scene, step, part
+        self._deadline = Deadline()
         stranger = stranger_of(scene)
         self._floats = stranger.floats
         of = None if wrap is None else (lambda name: wrap)
@@ -78,11 +87,11 @@ class PlainStepsTrial:
     def run(self) -> Observation:
         """Simulate the scene once."""
         began, driver, scene = time.perf_counter(), self._driver, self._scene
-        begin, end = recorded_window(scene, self._floats)
+        begin, end = window_of(scene, self._floats, self._part)
         w = self._floats.get("forcing.angular_frequency", 0.0)
         phase = self._floats.get("forcing.phase", 0.0)
-        limit = math.inf if scene.execution.deadline is None else began + scene.execution.deadline
-        seen, origin, failure = _Seen(begin), 0.0, ""
+        seen, origin, now, failure = _Seen(begin), 0.0, 0.0, ""
+        self._deadline.begin(scene.execution.deadline)
         driver.begin(self._floats, scene.execution.deadline)
         try:
             for i in range(1, math.ceil(end / self._step) + 1):
@@ -96,11 +105,10 @@ class PlainStepsTrial:
                     moved = {"forcing.phase": (phase + w * now) % (2.0 * math.pi)} if w else {}
                     driver.begin(self._floats | start | moved, scene.execution.deadline)
                     origin = now
-                if time.perf_counter() > limit:
-                    raise DeadlineReached
+                self._deadline.refuse_late()
         except DeadlineReached:
             failure = LATE
-        return seen.observation(driver.observed(), began, failure)
+        return seen.observation(driver.observed(), began, failure, now / end)
 
     def _thrown_back(self, now: float, motion: Floats, seen: _Seen) -> Floats | None:
         """Return the state after the impulses of all stops that the body is beyond; None where there are none."""
@@ -134,10 +142,15 @@ class PlainForcesTrial:
         Its size, s.
     wrap : callable or None
         Wraps the functions of the FMUs.
+    part : float
+        Part of the scene's time that is simulated.
     """
 
-    def __init__(self, scene: Scene, exchange: str, step: float, wrap: Wrapper | None = None) -> None:
+    def __init__(
+        self, scene: Scene, exchange: str, step: float, wrap: Wrapper | None = None, part: float = 1.0
+    ) -> None:
         self._scene, self._step, self._newest = scene, step, exchange == "gauss_seidel"
+        self._part = part
         floats, integers, stranger = (
             float_parameters(scene, None),
             integer_parameters(scene),
@@ -169,7 +182,7 @@ class PlainForcesTrial:
     def run(self) -> Observation:
         """Simulate the scene once."""
         began, driver, scene = time.perf_counter(), self._driver, self._scene
-        begin, end = recorded_window(scene, self._floats)
+        begin, end = window_of(scene, self._floats, self._part)
         touching = [False] * len(self._stops)
         seen, failure, now = _Seen(begin), "", 0.0
         driver.begin(self._floats, scene.execution.deadline)
@@ -198,7 +211,7 @@ class PlainForcesTrial:
                     touching[k] = inside
         except DeadlineReached:
             failure = LATE
-        return seen.observation(driver.observed(), began, failure)
+        return seen.observation(driver.observed(), began, failure, now / end)
 
     def _push(self) -> None:
         """Write what the stops answer into the force inputs of the body."""

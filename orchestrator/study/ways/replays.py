@@ -23,6 +23,8 @@ from vibroimpact.orchestrator.study.observation import (
 
 THINNED = (2, 4, 8, 16, 32)
 """One of how many samples is kept, as a slower board without a filter would have."""
+DEADLINE = "execution.deadline"
+"""The key that a replay names which has taken too long."""
 LEAST_SAMPLES = 64
 """Samples that are left, below which a recording is thinned no further."""
 
@@ -36,6 +38,8 @@ class ReplayTrial:
         With `[replay]`.
     every : int
         Keep one of so many samples of each channel.
+    part : float
+        Part of the time of the replay that is simulated.
 
     Raises
     ------
@@ -47,8 +51,9 @@ class ReplayTrial:
 
     is_guarded = False
 
-    def __init__(self, scene: Scene, every: int = 1) -> None:
+    def __init__(self, scene: Scene, every: int = 1, part: float = 1.0) -> None:
         recording = thinned(open_signals(recording_of(scene, 1)), every)
+        scene = first_part_of_replay(scene, part)
         self._replayer = Replayer(scene, recording, execution=scene.execution.how)
         self._variance: float | None = None
 
@@ -58,9 +63,14 @@ class ReplayTrial:
         try:
             motion = replayer.simulate()
         except ComponentError as error:
-            seconds, limit = time.perf_counter() - began, replayer.scene.execution.deadline
-            late = limit is not None and seconds >= limit
-            return Observation(seconds=seconds, failure=LATE if late else str(error).splitlines()[0])
+            said, now = str(error).splitlines()[0], error.time
+            late = said.startswith(f"{replayer.scene.source}: {DEADLINE}:")
+            span = float(replayer.time[-1] - replayer.time[0])
+            return Observation(
+                seconds=time.perf_counter() - began,
+                failure=LATE if late else said,
+                reached=math.nan if now is None else now / span,
+            )
         seconds = time.perf_counter() - began
         if self._variance is None:
             try:
@@ -124,6 +134,14 @@ def rates_of(scene: Scene) -> dict[int, float]:
         raise DatasetError(f"{recording.title}: {name}: expected at least two samples, got {len(axis.time)}.")
     least = min(len(channel.time) for channel in recording.channels.values())
     return {every: axis.rate / every for every in THINNED if least // every >= LEAST_SAMPLES}
+
+
+def first_part_of_replay(scene: Scene, part: float) -> Scene:
+    """Return a replay that ends after the first part of its time."""
+    if part == 1.0:
+        return scene
+    begin, end = span_of(scene)
+    return scene.with_values({"replay.stop": begin + part * (end - begin)})
 
 
 def span_of(scene: Scene) -> tuple[float, float]:

@@ -16,10 +16,10 @@ from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopContactSpec
 from vibroimpact.orchestrator.run.coupled import BODY, stop_name, stop_of, stop_parameters
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.observation import LATE, Observation
+from vibroimpact.orchestrator.study.ways.span import window_of
 from vibroimpact.orchestrator.study.ways.strangers import stranger_of
 
 
@@ -39,6 +39,8 @@ class RevisedTrial:
         Steps in a contact with a stop that yields.
     wrap : callable or None
         Wraps the functions of the FMUs.
+    part : float
+        Part of the scene's time that is simulated.
     """
 
     def __init__(
@@ -47,10 +49,11 @@ class RevisedTrial:
         step: float,
         contact_steps: float = CONTACT_STEPS,
         wrap: Wrapper | None = None,
+        part: float = 1.0,
     ) -> None:
         floats, integers = float_parameters(scene, None), integer_parameters(scene)
         self._scene = scene
-        self._window = recorded_window(scene, floats)
+        self._window = window_of(scene, floats, part)
         count = len(scene.stops)
         stranger = stranger_of(scene)
         self._values: dict[tuple[str, str], Value] = {
@@ -106,6 +109,7 @@ class RevisedTrial:
             (displacement, velocity),
             seconds=time.perf_counter() - began,
             failure=failure,
+            reached=self._importer.time / end,
         )
 
     def _note(self, event: Event) -> None:

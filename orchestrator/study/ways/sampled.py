@@ -11,6 +11,7 @@ from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.observation import Observation, observation_of
+from vibroimpact.orchestrator.study.ways.span import first_periods
 
 
 class SampledTrial:
@@ -26,11 +27,13 @@ class SampledTrial:
         Samples per s.
     wrap : callable or None
         Wraps the functions of the FMUs.
+    part : float
+        Part of the scene's recording that is simulated, in whole periods.
     """
 
-    def __init__(self, scene: Scene, rate: float, wrap: Wrapper | None = None) -> None:
+    def __init__(self, scene: Scene, rate: float, wrap: Wrapper | None = None, part: float = 1.0) -> None:
         series = {"rate": rate, "variables": ["displacement", "velocity"]}
-        sampled = scene.with_values({"record.time_series": series})
+        sampled = first_periods(scene, part).with_values({"record.time_series": series})
         of = None if wrap is None else (lambda name: wrap)
         self._runner = open_runner(sampled, sampled.execution.how, wrap=of)
 

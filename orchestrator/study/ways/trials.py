@@ -27,10 +27,10 @@ from vibroimpact.orchestrator.run.coupled import (
     stop_parameters,
 )
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
+from vibroimpact.orchestrator.study.ways.span import window_of
 
 ROWS_A_PERIOD = 4
 """Rows of an integration in a period, times the square of the number of modes: an integrator's steps between two rows
@@ -50,12 +50,14 @@ class CoupledTrial:
         `3.0` or `2.0`, of all components.
     wrap : callable or None
         Wraps the functions of the FMUs.
+    part : float
+        Part of the scene's time that is simulated.
     """
 
-    def __init__(self, scene: Scene, version: str, wrap: Wrapper | None = None) -> None:
+    def __init__(self, scene: Scene, version: str, wrap: Wrapper | None = None, part: float = 1.0) -> None:
         self._scene = scene
         self._floats, integers = float_parameters(scene, None), integer_parameters(scene)
-        self._window = recorded_window(scene, self._floats)
+        self._window = window_of(scene, self._floats, part)
         stops = len(scene.stops)
         body = ComponentSpec(BODY, fmu_path(FMU_NAMES[scene.body.kind], version), body_integers(integers))
         links = connections_of(stops)
@@ -114,6 +116,7 @@ class CoupledTrial:
             float(np.abs(self._energy.residuals()).sum()) if len(self._energy.residuals()) else math.nan,
             seconds=time.perf_counter() - began,
             failure=failure,
+            reached=self._importer.time / end,
         )
 
     def _note(self, event: Event | None) -> None:
@@ -141,10 +144,15 @@ class ModelExchangeTrial:
         Of the integrator, relative.
     wrap : callable or None
         Not used: FMPy calls the FMU itself, and nobody counts its calls.
+    part : float
+        Part of the scene's time that is simulated.
     """
 
-    def __init__(self, scene: Scene, tolerance: float, wrap: Wrapper | None = None) -> None:
-        self._scene, self._tolerance = scene, tolerance
+    def __init__(
+        self, scene: Scene, tolerance: float, wrap: Wrapper | None = None, part: float = 1.0
+    ) -> None:
+        self._scene, self._tolerance, self._part = scene, tolerance, part
+        self._deadline = Deadline()
         self._floats = float_parameters(scene, None)
         self._values = self._floats | integer_parameters(scene)
         self._fmu = fmu_path(FMU_NAMES[scene.body.kind])
@@ -154,14 +162,16 @@ class ModelExchangeTrial:
         from vibroimpact.fmus.packaging.fmpy_door import integrated
 
         began, scene = time.perf_counter(), self._scene
-        begin, end = recorded_window(scene, self._floats)
-        limit = math.inf if scene.execution.deadline is None else began + scene.execution.deadline
-        reached = 0.0
+        begin, end = window_of(scene, self._floats, self._part)
+        self._deadline.begin(None)
+        reached, is_late = 0.0, False
 
         def step_finished(now: float) -> bool:
-            nonlocal reached
-            reached = now
-            return time.perf_counter() < limit
+            nonlocal reached, is_late
+            if reached == 0.0:  # what FMPy loads before its first step is no part of the run's time
+                self._deadline.begin(scene.execution.deadline)
+            reached, is_late = now, self._deadline.is_over
+            return not is_late
 
         ports = range(1, len(scene.stops) + 1)
         told = ("count", "last_time", "last_velocity")
@@ -179,7 +189,7 @@ class ModelExchangeTrial:
             )
         except ComponentError as error:
             return Observation(seconds=time.perf_counter() - began, failure=str(error))
-        late = reached < end * (1.0 - 1e-9) and time.perf_counter() >= limit
+        late = reached < end * (1.0 - 1e-9) and is_late
         found: list[Floats] = [np.empty((0, 3))]
         for k in ports:
             counts = rows[f"contact[{k}].count"]
@@ -194,6 +204,7 @@ class ModelExchangeTrial:
             final=(float(rows["displacement"][-1]), float(rows["velocity"][-1])),
             seconds=time.perf_counter() - began,
             failure=LATE if late else "",
+            reached=reached / end,
         )
 
     def close(self) -> None:

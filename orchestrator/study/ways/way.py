@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -15,7 +15,9 @@ from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.study.observation import Observation, observation_of
+from vibroimpact.orchestrator.study.ways.driven import DrivenTrial
 from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
+from vibroimpact.orchestrator.study.ways.span import first_part
 
 
 class Trial(Protocol):
@@ -28,7 +30,11 @@ class Trial(Protocol):
         """Free what was opened."""
 
 
-Opener = Callable[[Wrapper | None], Trial]
+class Opener(Protocol):
+    """Opens a way, over all of its scene's time or the first part of it."""
+
+    def __call__(self, wrap: Wrapper | None, part: float = 1.0) -> Trial:
+        """Return the trial; `wrap` wraps the functions of all FMUs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +52,7 @@ class Way:
     changes : mapping of str to Any
         Keys of the scene, with the values that make it run this way; empty where no scene says it.
     open : callable
-        Opens the way; given a wrapper of the functions of all FMUs, or None.
+        Opens the way; given a wrapper of the functions of all FMUs, or None, and the part of the time to simulate.
     model : bool
         Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise.
     against : Scene or None
@@ -108,12 +114,25 @@ def opened_trial(scene: Scene, wrap: Wrapper | None = None) -> SceneTrial | Repl
     return SceneTrial(scene, wrap) if scene.replay is None else ReplayTrial(scene)
 
 
+def opened_part(scene: Scene, part: float, wrap: Wrapper | None = None) -> Trial:
+    """Open a scene as it says itself, to simulate the first part of its time."""
+    if part == 1.0:
+        return opened_trial(scene, wrap)
+    if scene.general is not None or scene.replay is not None:
+        return opened_trial(first_part(scene, part), wrap)
+    return DrivenTrial(scene, part, wrap)
+
+
 def way_by_scene(
     name: str, knob: str, setting: float, scene: Scene, changes: Mapping[str, Any], *, model: bool = False
 ) -> Way:
     """Return the way in which the scene's own runner runs it, with other values of some keys."""
     changed = scene.with_values(changes) if changes else scene
-    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), model, scene=changed)
+
+    def opened(wrap: Wrapper | None, part: float = 1.0) -> Trial:
+        return opened_part(changed, part, wrap)
+
+    return Way(name, knob, setting, changes, opened, model, scene=changed)
 
 
 def can_have(scene: Scene, changes: Mapping[str, Any]) -> bool:
