@@ -13,6 +13,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -160,10 +161,12 @@ def integrated(
     ComponentError
         The integrator or the FMU failed, with what FMPy says.
     """
-    folder = str(unpack(path).folder)
+    folder = unpack(path).folder
     try:
         found: np.ndarray[Any, Any] = simulate_fmu(
-            folder,
+            str(folder),
+            model_description=_description_in(folder),
+            logger=_ignored_log,
             fmi_type="ModelExchange",
             solver="CVode",
             stop_time=stop_time,
@@ -177,6 +180,16 @@ def integrated(
         # FMPy raises plain Exception where a solver gives up
         raise ComponentError(f"{path.stem}: model exchange: {error}") from error
     return found
+
+
+@lru_cache(maxsize=4)
+def _description_in(folder: Path) -> ModelDescription:
+    """Return the model description of an unpacked FMU, whose folder is named by its content: read once."""
+    return read((folder / DESCRIPTION).read_bytes()).description
+
+
+def _ignored_log(*message: object) -> None:
+    """Print nothing of what an FMU logs: FMPy prints each line between those of a command."""
 
 
 def schema_folder() -> Path:

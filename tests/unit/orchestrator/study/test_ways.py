@@ -102,3 +102,23 @@ def test_recordings_are_halved_to_a_period() -> None:
     shorter = halved(free)
     assert shorter is not None
     assert shorter.record.recorded_time == first_part(free, 0.5).record.recorded_time == 2.5
+
+
+SLENDER: dict[str, Any] = {
+    "body": {
+        **{"kind": "beam", "modes": 16, "damping_ratio": 0.005, "length": 0.4, "width": 0.03},
+        **{"thickness": 0.004, "youngs_modulus": 70e9, "density": 2700.0},
+    },
+    "forcing": {"location": 0.5, "amplitude": 4.0, "frequency": 21.0},
+    "stop": [{"law": "kelvin_voigt", "position": 0.0015, "stiffness": 5e5, "damping": 20.0}],
+    "record": {"recorded_periods": 1},
+}
+"""A beam whose FMU warns of modes that leave the validity of its theory."""
+
+
+def test_what_an_fmu_logs_to_its_integrator_does_not_reach_the_user(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    found = ModelExchangeTrial(Scene.from_dict(SLENDER), 1e-4, part=2.0**-10).run()
+    assert found.failure == ""
+    assert capfd.readouterr() == ("", "")
