@@ -32,7 +32,7 @@ def accuracy(
     of : str
         What errors are of: `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`, or `all`.
     budget : float
-        Wall time to spend, about, s.
+        Processor time to spend, of all processes, s: kept within a factor of 1.5, 10 at least.
 
     Returns
     -------
@@ -44,8 +44,9 @@ def accuracy(
     SceneError
         With all problems of the scene, each on one line.
     UsageError
-        There is nothing to vary, no such quantity, no such budget, no place for the file, or no way reaches the
-        tolerance. Only the last takes the time of a study, unless the reference is known to less.
+        There is nothing to vary, no such quantity, a budget below 10 s or below what the scene needs, no place for the
+        file, or no way reaches the tolerance. Only the last takes the time of a study, unless the reference is known to
+        less.
 
     Examples
     --------

@@ -123,20 +123,23 @@ def table_of(
         Forcing periods of a run; NaN where nothing forces it.
     """
     scored = any(one.variance == one.variance for one in measured)
-    wide = width >= WIDE
-    of_periods = wide and periods == periods
+    wide, of_periods = width >= WIDE, periods == periods
+    of_runs = wide or not of_periods
     rows = table(
         f"What accuracy costs: {title}",
-        *("<way", "<set", ">value", ">error", ">a run", ">spread"),
+        *("<way", "<set", ">value", ">error"),
+        *((">a run",) if of_runs else ()),
         *((">a period",) if of_periods else ()),
+        ">spread",
         *((">an impact", ">calls", ">memory") if wide else ()),
         *((">accounts for",) if scored else ()),
         "<what is wrong",
     )
     for one in measured:
-        spread = (max(one.seconds) - min(one.seconds)) / one.cost if len(one.seconds) > 1 else math.nan
+        spread = (max(one.seconds) - min(one.seconds)) / one.each if len(one.seconds) > 1 else math.nan
+        about = "~" if one.is_extrapolated else ""
         each = (
-            _known_duration(one.cost_of_one(one.impacts)),
+            _known_duration(one.cost_of_impact),
             str(one.calls) if one.calls >= 0 else "-",
             f"{one.memory / MEGABYTE:.1f} MB" if one.memory >= 0 else "-",
         )
@@ -145,14 +148,19 @@ def table_of(
             one.way.knob or "-",
             f"{one.way.setting:.3g}" if one.way.knob else "-",
             one.told(quantity, known),
-            duration(one.cost) if one.seconds else "-",
+            *((about + _known_duration(one.cost),) if of_runs else ()),
+            *((about + _known_duration(one.cost_of_one(periods)),) if of_periods else ()),
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
-            *((_known_duration(one.cost_of_one(periods)),) if of_periods else ()),
             *(each if wide else ()),
             *((f"{one.variance:.2f} %",) if scored else ()),
-            one.errors.failure,
+            "; ".join(filter(None, (one.errors.failure, _part_in_words(one.part)))),
         )
     return rows
+
+
+def _part_in_words(part: float) -> str:
+    """Return which part of the time was simulated, a power of two; empty for all of it."""
+    return "" if part == 1.0 else f"first 1/{1.0 / part:.0f} only"
 
 
 def _known_duration(seconds: float) -> str:
@@ -169,6 +177,9 @@ def _print(study: Study) -> None:
         say(f"Other numbers of modes are compared with {study.modes_reference}.")
     for remark in study.remarks:
         say(f"Left out: {remark}.")
+    if any(one.is_extrapolated for one in study.measured):
+        say("~: cost extrapolated from the first part of the time; the error is that of this part.")
+    say(study.effort.in_words())
     say(advice(study))
 
 

@@ -100,7 +100,9 @@ def accuracy(
     write: Annotated[
         Path | None, typer.Option(help="Scene file (TOML) to write, with the way that reaches the tolerance.")
     ] = None,
-    budget: Annotated[float, typer.Option(help="Wall time to spend, about, s.", min=1.0)] = 40.0,
+    budget: Annotated[
+        float, typer.Option(help="Processor time to spend, of all processes, s; at least 10.")
+    ] = 40.0,
     changes: Changes = None,
     force: Force = False,
 ) -> None:

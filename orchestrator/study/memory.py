@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.processor import processor_time_of_all
 from vibroimpact.orchestrator.study.ways.all_ways import ways_of
 from vibroimpact.orchestrator.study.ways.way import Way
 
@@ -19,7 +22,9 @@ IS_MEASURED = sys.platform == "linux"
 """Elsewhere the resident memory of a process that was forked is not told by its peak."""
 
 
-def memory_of_ways(scene: Scene, given: Mapping[str, float], places: Sequence[int]) -> dict[int, int]:
+def memory_of_ways(
+    scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float = math.inf
+) -> dict[int, int]:
     """Return the largest resident memory that ways add to a process, Python's and that of the FMUs, bytes.
 
     A process is started that loads this package and nothing else; each way is opened and run once in a fork of it, so
@@ -29,34 +34,41 @@ def memory_of_ways(scene: Scene, given: Mapping[str, float], places: Sequence[in
     ----------
     scene : Scene
         Without a sweep.
-    given : mapping of str to float
+    given : mapping of str to Any
         What `ways_of` is given beside the scene.
-    places : sequence of int
-        Of the ways that are measured, in the order of `ways_of`.
+    parts : sequence of (int, float)
+        Place of each way that is measured, in the order of `ways_of`, and the part of the time that it simulates.
+    seconds : float
+        Processor time, s, after which no further way is measured.
 
     Returns
     -------
     dict of int to int
-        By place; what a process that died would have taken is missing. Nothing where the system does not tell, or
-        the FMUs run in processes of their own.
+        By place; what a process that died would have taken is missing, and ways for which no time was left. Nothing
+        where the system does not tell, or the FMUs run in processes of their own.
     """
     guarded = scene.general.guard if scene.general is not None else scene.execution.guard
     if guarded or not IS_MEASURED:
         return {}
     try:
-        found: dict[int, int] = call_alone(_in_forks, scene, dict(given), tuple(places))
+        found: dict[int, int] = call_alone(_in_forks, scene, dict(given), tuple(parts), seconds)
     except ProcessDied:
         return {}
     return found
 
 
-def _in_forks(scene: Scene, given: dict[str, float], places: tuple[int, ...]) -> dict[int, int]:
-    ways = ways_of(scene, **given)
-    found = {place: memory_in_fork(ways[place]) for place in places}
+def _in_forks(
+    scene: Scene, given: dict[str, Any], parts: tuple[tuple[int, float], ...], seconds: float
+) -> dict[int, int]:
+    ways, found = ways_of(scene, **given), {}
+    for place, part in parts:
+        if processor_time_of_all() > seconds:
+            break
+        found[place] = memory_in_fork(ways[place], part)
     return {place: memory for place, memory in found.items() if memory != UNKNOWN}
 
 
-def memory_in_fork(way: Way) -> int:
+def memory_in_fork(way: Way, part: float = 1.0) -> int:
     """Open and run a way in a fork of this process; return what its resident memory grew by at most, bytes."""
     answers, answer = os.pipe()
     with warnings.catch_warnings():
@@ -66,7 +78,7 @@ def memory_in_fork(way: Way) -> int:
     if process == 0:
         try:
             os.close(answers)
-            os.write(answer, str(_growth(way)).encode())
+            os.write(answer, str(_growth(way, part)).encode())
         finally:
             os._exit(0)  # whatever it was, nothing else of this process runs twice
     os.close(answer)
@@ -76,10 +88,10 @@ def memory_in_fork(way: Way) -> int:
     return int(said) if said else UNKNOWN
 
 
-def _growth(way: Way) -> int:
+def _growth(way: Way, part: float) -> int:
     before = _peak()
     try:
-        trial = way.open(None)
+        trial = way.open(None, part)
         trial.run()
     except VibroimpactError:
         return UNKNOWN

@@ -66,6 +66,8 @@ class Reference:
     chaotic : bool
         Whether nothing but statistics can be compared after the first impacts.
     scales : Scales
+    best : Scene
+        What was run for it.
     """
 
     observation: Observation
@@ -74,6 +76,7 @@ class Reference:
     sensitivity: float
     chaotic: bool
     scales: Scales
+    best: Scene
 
 
 def _finest_exchange(scene: Scene) -> Reference:
@@ -83,12 +86,10 @@ def _finest_exchange(scene: Scene) -> Reference:
     the motion is chaotic by runs at the scene's own step.
     """
     assert scene.general is not None
-    scales, own = scales_of(scene), scene.general.macro_step
-    runs = []
-    for part in (4.0, 2.0, 1.0):
-        step = {"execution.macro_step": own * FINEST_STEP * part, "execution.exchange": "iterated"}
-        runs.append(observed(scene.with_values(step)))
-    coarse, middle, finest = runs
+    scales, own, best = scales_of(scene), scene.general.macro_step, best_of(scene)
+    steps = [{"execution.macro_step": own * FINEST_STEP * part} for part in (4.0, 2.0)]
+    coarse, middle = (observed(best.with_values(step)) for step in steps)
+    finest = observed(best)
     first, second = errors_of(coarse, finest, scales).of, errors_of(middle, finest, scales).of
     error = {}
     for name, off in second.items():
@@ -97,7 +98,20 @@ def _finest_exchange(scene: Scene) -> Reference:
         error[name] = off / gain + SAFETY * ROUNDING
     name = f"iterated exchange at a macro step of {own * FINEST_STEP:.3g}"
     sensitivity = sensitivity_of(scene, scales)
-    return Reference(finest, name, error, sensitivity, sensitivity > CHAOTIC / DISTURBANCE, scales)
+    return Reference(finest, name, error, sensitivity, sensitivity > CHAOTIC / DISTURBANCE, scales, best)
+
+
+def best_of(scene: Scene) -> Scene:
+    """Return a scene as its reference runs: fused, with the finest tolerance of contacts, or the finest exchange."""
+    if scene.general is not None:
+        step = scene.general.macro_step * FINEST_STEP
+        return scene.with_values({"execution.macro_step": step, "execution.exchange": "iterated"})
+    best = scene.with_values({"execution.how": "fused"})
+    return best.with_values({"execution.contact_tolerance": FINEST}) if _is_integrated(scene) else best
+
+
+def _is_integrated(scene: Scene) -> bool:
+    return any(not isinstance(stop, RestitutionStop | KelvinVoigtStop) for stop in scene.stops)
 
 
 def sensitivity_of(scene: Scene, scales: Scales) -> float:
@@ -110,7 +124,7 @@ def sensitivity_of(scene: Scene, scales: Scales) -> float:
 
 
 def scales_of(scene: Scene, part: float = 1.0) -> Scales:
-    """Return the scales of the errors of a scene, or of the first part of its time."""
+    """Return what errors of a scene are relative to, of the first part of its time where no other is meant."""
     if scene.general is not None or scene.replay is not None:
         scene = first_part(scene, part)
     if scene.general is not None:
@@ -135,11 +149,7 @@ def reference_of(scene: Scene) -> Reference:
     """
     if scene.general is not None:
         return _finest_exchange(scene)
-    scales = scales_of(scene)
-    integrated = any(not isinstance(stop, RestitutionStop | KelvinVoigtStop) for stop in scene.stops)
-    best = scene.with_values({"execution.how": "fused"})
-    if integrated:
-        best = best.with_values({"execution.contact_tolerance": FINEST})
+    scales, integrated, best = scales_of(scene), _is_integrated(scene), best_of(scene)
     observation = observed(best)
     keys = disturbed_keys(best)
     disturbed = [_disturbed(best, key) for key in keys]
@@ -165,7 +175,7 @@ def reference_of(scene: Scene) -> Reference:
     closed = None if chaotic else _closed_form(scene, observation, scales)
     if closed is not None:
         observation, name = closed, "the closed form of the P(1,1) motion"
-    return Reference(observation, name, error, sensitivity, chaotic, scales)
+    return Reference(observation, name, error, sensitivity, chaotic, scales, best)
 
 
 def _shallowness(scene: Scene, observation: Observation) -> float:

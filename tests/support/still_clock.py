@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
 
 import pytest
 
+from vibroimpact.orchestrator.run.record import runs_limited
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study import clock
 from vibroimpact.orchestrator.study.clock import Clock
@@ -22,13 +25,25 @@ NEVER_LATE = 1e4
 class StillClock(Clock):
     """Measures nothing: no run is repeated, and each takes the same time."""
 
-    def now(self) -> float:
-        """Return the same instant each time: no budget is spent."""
+    def wall(self) -> float:
+        """Return the same instant each time."""
         return 0.0
 
-    def wall_time(self, trial: Trial) -> float:
-        """Return the time of any run, s."""
-        return RUN
+    def spent(self) -> float:
+        """Return the same time each time: no budget is spent."""
+        return 0.0
+
+    def limited(self, seconds: float) -> AbstractContextManager[None]:
+        """Give up no run."""
+        return runs_limited(seconds, lambda: 0.0)
+
+    def observed(self, trial: Trial) -> tuple[Observation, float, float]:
+        """Run a trial; return what it shows, and the times of any run, s."""
+        return trial.run(), RUN, RUN
+
+    def timed(self, trial: Trial) -> tuple[float, float]:
+        """Return the times of any run, s."""
+        return RUN, RUN
 
     def processor_time(self, trial: SceneTrial | ReplayTrial) -> float:
         """Return the time of any run, s."""
@@ -38,7 +53,9 @@ class StillClock(Clock):
         """Return that nobody counts them."""
         return -1
 
-    def memory(self, scene: Scene, given: Mapping[str, float], places: Sequence[int]) -> dict[int, int]:
+    def memory(
+        self, scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float
+    ) -> dict[int, int]:
         """Return that nobody measures it."""
         return {}
 

@@ -21,7 +21,7 @@ DEFAULT_TOLERANCE = 1e-6
 
 def pareto_front(measured: Sequence[Measured], quantity: str) -> list[Measured]:
     """Return the ways of which no other is both cheaper and at least as exact; other models are no ways."""
-    able = [one for one in measured if not one.way.model and one.error(quantity) == one.error(quantity)]
+    able = _comparable(measured, quantity)
     front: list[Measured] = []
     for one in sorted(able, key=lambda one: (one.cost, one.error(quantity))):
         if not front or one.error(quantity) < front[-1].error(quantity):
@@ -37,7 +37,7 @@ def cheapest(
     Without a tolerance it is `DEFAULT_TOLERANCE`, or the least error that there is.
     """
     own = error_of_reference(reference, quantity)
-    able = [one for one in measured if not one.way.model and one.error(quantity) == one.error(quantity)]
+    able = _comparable(measured, quantity)
     if tolerance is None and own > VAGUE:
         return None
     if tolerance is None:
@@ -45,6 +45,15 @@ def cheapest(
         tolerance = max(DEFAULT_TOLERANCE, least + own)
     able = [one for one in able if one.error(quantity) + own <= tolerance]
     return min(able, key=lambda one: one.cost, default=None)
+
+
+def _comparable(measured: Sequence[Measured], quantity: str) -> list[Measured]:
+    """Return the ways with an error over all of the time: neither other models, nor ways that simulated a part."""
+    return [
+        one
+        for one in measured
+        if not (one.way.model or one.is_extrapolated) and one.error(quantity) == one.error(quantity)
+    ]
 
 
 def error_of_reference(reference: Reference, quantity: str) -> float:
@@ -62,7 +71,7 @@ def refuse_unreached(study: Study) -> None:
     """
     if study.chosen is not None or math.isnan(study.tolerance):
         return
-    able = [one for one in study.measured if not one.way.model and one.error(study.quantity) >= 0.0]
+    able = _comparable(study.measured, study.quantity)
     own = error_of_reference(study.reference, study.quantity)
     best = min(able, key=lambda one: one.error(study.quantity), default=None)
     reached = "nothing"
@@ -84,13 +93,7 @@ def advice(study: Study) -> str:
     what = "" if quantity == "all" else f" of {quantity.replace('_', ' ')}"
     told, cost = chosen.told(quantity, known), _seconds(chosen.cost)
     words = f"Take {chosen.way.label}: a relative error{what} of {told} in {cost} a run"
-    others = [
-        one
-        for one in study.measured
-        if one.way.name != chosen.way.name
-        and not one.way.model
-        and one.error(quantity) == one.error(quantity)
-    ]
+    others = [one for one in _comparable(study.measured, quantity) if one.way.name != chosen.way.name]
     if others:
         other = min(others, key=lambda one: one.cost)
         ratio = other.cost / chosen.cost
@@ -115,7 +118,7 @@ def _for_the_score(study: Study) -> str:
     alike = [
         one
         for one in study.measured
-        if not (one.way.model or one.errors.failure)
+        if not (one.way.model or one.errors.failure or one.is_extrapolated)
         and abs(one.variance - chosen.variance) <= SAME_SCORE
         and one.cost < chosen.cost
     ]

@@ -9,6 +9,7 @@ from numbers import Real
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET
 from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
 from vibroimpact.orchestrator.study.errors import QUANTITIES
 from vibroimpact.orchestrator.study.references import ROUNDING, SAFETY, Reference
@@ -28,7 +29,7 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
     quantity : str
         One of `errors.QUANTITIES`, or `all`.
     budget : float
-        Wall time, s.
+        Processor time, s.
 
     Raises
     ------
@@ -37,14 +38,15 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
     Examples
     --------
     >>> refuse_misuse(1e-6, "all", 40.0)
-    >>> refuse_misuse(1e-6, "all", -1.0)
+    >>> refuse_misuse(1e-6, "all", 2.0)
     Traceback (most recent call last):
-    vibroimpact.fmus.errors.UsageError: budget: expected a time > 0, in s, got -1.0.
+    vibroimpact.fmus.errors.UsageError: budget: expected a finite processor time of 10 s or more, got 2.0.
     """
     if quantity not in ("all", *QUANTITIES):
         raise UsageError(f"{option('of')}: expected all, {', '.join(QUANTITIES)}, got {quantity!r}.")
-    if not _is_between(0.0, budget):
-        raise UsageError(f"{option('budget')}: expected a time > 0, in s, got {budget!r}.")
+    if not (_is_between(0.0, budget) and budget >= LEAST_BUDGET):
+        least = f"expected a finite processor time of {LEAST_BUDGET:g} s or more"
+        raise UsageError(f"{option('budget')}: {least}, got {budget!r}.")
     if tolerance is None:
         return
     if not _is_between(0.0, tolerance):

@@ -7,22 +7,25 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 import vibroimpact.orchestrator.study.clock as clock
-from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.accuracy.budget import Budget
 from vibroimpact.orchestrator.study.accuracy.choice import cheapest
 from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
+from vibroimpact.orchestrator.study.accuracy.reach import Passed, transient_passed, within_reach
 from vibroimpact.orchestrator.study.accuracy.refusals import (
     refuse_misuse,
     refuse_one_way,
     refuse_vague_reference,
 )
-from vibroimpact.orchestrator.study.balance import balance_of
-from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, errors_of, no_errors
+from vibroimpact.orchestrator.study.accuracy.trying import References, tried
+from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.memory import UNKNOWN
 from vibroimpact.orchestrator.study.orbits import orbit_of
@@ -38,19 +41,26 @@ from vibroimpact.orchestrator.study.references import (
 from vibroimpact.orchestrator.study.statistics import statistics_of
 from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
 from vibroimpact.orchestrator.study.ways.models import told_by
-from vibroimpact.orchestrator.study.ways.trials import far_off
 from vibroimpact.orchestrator.study.ways.way import Trial, Way
 
 BUDGET = 40.0
-"""Wall time of a study, s, where nobody says another."""
-LEAST_ROUNDS, MOST_ROUNDS = 3, 15
-"""How often each way is timed, in turn with the others."""
+"""Default budget: processor time of a study, s."""
+TRYING_SHARE = 0.45
+"""Largest share of the budget for the reference and one run of each way; a way that needs its least gets more."""
+ATTEMPTS = 2
+"""Runs that the share of a way is to be enough for: all but the last are given up."""
+LEAST_RUN = 0.05
+"""Processor time, s, before which no run is given up."""
+MEMORY_SHARE, LEAST_MEMORY = 0.3, 2.5
+"""Share of the budget kept for the memory of the ways; and processor time, s, below which none is measured."""
+STATISTICS_SHARE = 0.25
+"""Largest share of the budget for the statistics of chaotic motion."""
+MOST_ROUNDS = 15
+"""How often each way is timed at most, in turn with the others."""
 EACH_SHARE = 0.1
-"""Of the time that is left, what one way may have taken and still be timed again."""
-LATE_SHARE, LEAST_LATE = 0.04, 0.5
-"""Of the budget, after which one run is given up; and no earlier than that, s."""
-COUNTED = 0.25
-"""Wall time of a run, s, above which its calls are not counted: that takes several times as long."""
+"""Share of the time left, above which a run of a way is too dear to be timed again."""
+GUARDED_SHARE, LEAST_GUARDED = 0.04, 0.5
+"""Share of the budget, in wall time, after which a run in another process is given up; and the least, s."""
 REPLICATES = 6
 """Runs of chaotic motion, each from a slightly different number, that tell the sampling error of its statistics."""
 MOST_HALVINGS = 24
@@ -80,7 +90,7 @@ def study_accuracy(
     quantity : str
         One of `errors.QUANTITIES`, or `all`, the worst of those.
     budget : float
-        Wall time that the study takes, about, s.
+        Processor time that the study takes, of all its processes, within a factor of 1.5, s.
     told : callable
         Given each way as soon as it has run once.
 
@@ -91,43 +101,67 @@ def study_accuracy(
     Raises
     ------
     UsageError
-        There is no such quantity, nothing to vary, a budget that is no time, or a tolerance that no way can reach:
-        double precision or the reference of the scene does not tell it. No way has run then.
+        There is no such quantity, nothing to vary, a budget below 10 s or below what this scene needs, or a tolerance
+        that no way can reach: double precision or the reference of the scene does not tell it. No way has run then.
     """
     refuse_misuse(tolerance, quantity, budget)
-    end = clock.CLOCK.now() + budget
-    whole, late = studied_scene(scene), max(LEAST_LATE, LATE_SHARE * budget)
-    refuse_one_way(ways_of(whole), scene)
-    reference = reference_of(whole)
-    orbit = "chaotic" if reference.chaotic else ""
-    if not reference.chaotic and whole.general is None and whole.replay is None:
-        orbit = orbit_of(reference.observation, whole.period, reference.scales.window)
-    studied = first_impacts(whole, reference) if reference.chaotic else whole
+    spends = Budget(budget)
+    alone = studied_scene(scene)
+    refuse_one_way(ways_of(alone), scene)
+    whole = within_reach(alone, spends)
+    passed = transient_passed(whole, spends)
+    reference = reference_of(passed.scene)
+    statistical = passed.scene if reference.chaotic else None
+    orbit = _orbit_of(reference, whole, passed)
     if reference.chaotic:
-        reference = replace(reference_of(studied), chaotic=True, sensitivity=reference.sensitivity)
+        first = first_impacts(whole, reference)
+        passed = Passed(first, first)
+        reference = replace(reference_of(first), chaotic=True, sensitivity=reference.sensitivity)
     refuse_vague_reference(tolerance, quantity, reference)
+    given = {"speed": _typical_speed(reference), "rate": _rate_of(scene), "whole": passed.whole}
+    ways = ways_of(_limited(passed.scene, budget), **given | {"whole": _limited(passed.whole, budget)})
+    found = _measured(ways, References(reference, passed), passed, given, spends, told, statistical)
+    return Study(
+        passed.scene,
+        reference,
+        found,
+        quantity,
+        math.nan if tolerance is None else tolerance,
+        cheapest(found, tolerance, quantity, reference),
+        orbit,
+        (*remarks_on(scene), *_remarks(alone, whole, passed)),
+        told_by(ways),
+        spends.effort(),
+    )
+
+
+def _measured(
+    ways: Sequence[Way],
+    references: References,
+    passed: Passed,
+    given: Mapping[str, Any],
+    spends: Budget,
+    told: Callable[[Measured], None],
+    statistical: Scene | None,
+) -> list[Measured]:
+    """Run all ways once, then in turn, and last in processes of their own; return what came of each."""
     found: list[Measured] = []
-    finest: dict[Scene, Reference] = {}
     with ExitStack() as stack:
-        measured: list[tuple[Measured, Trial]] = []
-        given = {"speed": _typical_speed(reference), "rate": _rate_of(scene)}
-        ways = ways_of(given_up_after(studied, late), **given)
-        for way in ways:
-            one, trial = _tried(way, _told_by(way, reference, finest))
+        able: list[tuple[Measured, Trial]] = []
+        for place, way in enumerate(ways):
+            left = TRYING_SHARE * spends.seconds - spends.spent
+            one, trial = tried(way, references, max(LEAST_RUN, left / (ATTEMPTS * (len(ways) - place))))
             if trial is not None:
+                spends.note(one.first, one.first_wall)
                 stack.callback(trial.close)
-                measured.append((one, trial))
+                able.append((one, trial))
             told(one)
             found.append(one)
-        _add_memory(given_up_after(studied, late), given, ways, [one for one, _ in measured])
-        _time_in_turn(measured, end)
-    if reference.chaotic:
-        _add_statistics(whole, given_up_after(whole, late), found)
-    wanted = math.nan if tolerance is None else tolerance
-    chosen = cheapest(found, tolerance, quantity, reference)
-    return Study(
-        studied, reference, found, quantity, wanted, chosen, orbit, tuple(remarks_on(scene)), told_by(ways)
-    )
+        if statistical is not None:
+            _add_statistics(statistical, found, references.reference, spends)
+        _time_in_turn(able, spends)
+    _add_memory(passed.scene, given, ways, [one for one, _ in able], spends)
+    return found
 
 
 def studied_scene(scene: Scene) -> Scene:
@@ -152,10 +186,40 @@ def studied_scene(scene: Scene) -> Scene:
     return alone.with_values({"record.impacts": True, "record.extrema": True})
 
 
-def given_up_after(scene: Scene, seconds: float) -> Scene:
-    """Return a scene whose runs are given up after some wall time, or earlier where it says so."""
-    own = scene.execution.deadline
+def _orbit_of(reference: Reference, whole: Scene, passed: Passed) -> str:
+    """Return the class of the orbit, by the run that passed the transient; empty for components and replays.
+
+    A contact that lasts since before the recording is an impact of a motion that starts in it.
+    """
+    if reference.chaotic:
+        return "chaotic"
+    if whole.general is not None or whole.replay is not None:
+        return ""
+    found = reference.observation
+    if passed.observation is not None:
+        found = replace(passed.observation, held=found.held)
+    return orbit_of(found, whole.period, scales_of(whole).window)
+
+
+def _limited(scene: Scene, budget: float) -> Scene:
+    """Return a scene whose runs in another process are given up after some wall time, or earlier where it says so."""
+    is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+    if not is_guarded:
+        return scene
+    own, seconds = scene.execution.deadline, max(LEAST_GUARDED, GUARDED_SHARE * budget)
     return scene.with_values({"execution.deadline": seconds if own is None else min(own, seconds)})
+
+
+def _remarks(alone: Scene, studied: Scene, passed: Passed) -> list[str]:
+    """Return what of a scene's time is left out, and why."""
+    remarks = [passed.remark] if passed.remark else []
+    if studied is not alone:
+        end, whole = (scales_of(one).window[1] - scales_of(one).window[0] for one in (studied, alone))
+        remarks.append(
+            f"all but the first {end:.3g} s of the {whole:.3g} s that are recorded: one run of all of it takes too "
+            "much of the budget"
+        )
+    return remarks
 
 
 def first_impacts(scene: Scene, reference: Reference) -> Scene:
@@ -198,87 +262,46 @@ def _rate_of(scene: Scene) -> float:
     return scene.sampling_rate or math.nan
 
 
-def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
-    """Run a way once, counting calls, and compare what it shows; no trial where it failed."""
-    try:
-        trial = way.open(None)
-    except (ComponentError, SceneError, DatasetError) as error:
-        return Measured(way, no_errors(_first_line(error))), None
-    try:
-        found = trial.run()
-    except ComponentError as error:
-        trial.close()
-        return Measured(way, no_errors(_first_line(error))), None
-    if way.scene is not None and not found.failure:
-        found = replace(found, energy_balance=balance_of(way.scene))
-    errors = errors_of(found, reference.observation, reference.scales)
-    if not found.failure and far_off(found, reference.observation):
-        errors = no_errors("fell through")
-    one = Measured(
-        way,
-        errors,
-        impacts=len(found.impacts),
-        energy_residual=found.energy_residual,
-        variance=found.variance,
-    )
-    if found.failure:
-        trial.close()
-        one.seconds.append(found.seconds)
-        return one, None
-    if found.seconds < COUNTED:
-        one.calls = clock.CLOCK.calls(way)
-    return one, trial
-
-
-def _told_by(way: Way, reference: Reference, finest: dict[Scene, Reference]) -> Reference:
-    """Return what the errors of a way are measured against; the finest model of a kind runs once."""
-    if way.against is None:
-        return reference
-    if way.against not in finest:
-        finest[way.against] = replace(reference, observation=observed(way.against))
-    return finest[way.against]
-
-
 def _add_memory(
-    scene: Scene, given: Mapping[str, float], ways: Sequence[Way], measured: Sequence[Measured]
+    scene: Scene, given: Mapping[str, Any], ways: Sequence[Way], measured: Sequence[Measured], spends: Budget
 ) -> None:
-    """Find what memory each way takes that did not fail."""
+    """Find what memory each way takes that did not fail, the cheapest first, as long as there is time."""
+    if spends.left < LEAST_MEMORY:
+        return
     places = {id(way): place for place, way in enumerate(ways)}
-    memory = clock.CLOCK.memory(scene, given, [places[id(one.way)] for one in measured])
+    ordered = sorted(measured, key=lambda one: one.each)
+    parts = [(places[id(one.way)], one.part) for one in ordered]
+    memory = clock.CLOCK.memory(scene, given, parts, spends.left)
     for one in measured:
         one.memory = memory.get(places[id(one.way)], UNKNOWN)
 
 
-def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], end: float) -> None:
+def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], spends: Budget) -> None:
     """Run all ways in turn, again and again, until the time is over; a way that failed is timed as well."""
     gc.collect()
-    for round_number in range(MOST_ROUNDS):
-        if round_number >= LEAST_ROUNDS and clock.CLOCK.now() > end:
-            break
+    reserve = min(MEMORY_SHARE * spends.seconds, 0.5 * spends.left)
+    for _ in range(MOST_ROUNDS):
         for one, trial in measured:
-            left = end - clock.CLOCK.now()
-            if round_number >= LEAST_ROUNDS and sum(one.seconds) > EACH_SHARE * left:
-                continue
-            one.seconds.append(clock.CLOCK.wall_time(trial))
+            if one.each <= EACH_SHARE * (spends.left - reserve):
+                one.seconds.append(spends.time(trial))
 
 
-def _add_statistics(scene: Scene, limited: Scene, found: Sequence[Measured]) -> None:
-    """Compare the statistics of whole runs where nothing else can be compared."""
+def _add_statistics(scene: Scene, found: Sequence[Measured], reference: Reference, spends: Budget) -> None:
+    """Compare the statistics of whole runs where nothing else can be compared, of ways that take little enough."""
     replicates = [observed(one) for one in disturbed_scenes(scene, REPLICATES)]
-    reference = observed(scene)
+    expected = observed(scene)
+    longer = scales_of(scene).window[1] / reference.scales.window[1]
+    each = STATISTICS_SHARE * spends.seconds / max(len(found), 1)
     by_label = {one.way.label: one for one in found}
-    for way in ways_of(limited):
+    for way in ways_of(scene):
         one = by_label.get(way.label)
-        if one is None or one.errors.failure:
+        if one is None or one.errors.failure or one.cost * longer > each:
             continue
         with suppress(ComponentError):
             trial = way.open(None)
             try:
-                one.statistics = statistics_of(trial.run(), reference, replicates)
+                with clock.CLOCK.limited(each):
+                    shown = trial.run()
+                one.statistics = None if shown.failure else statistics_of(shown, expected, replicates)
             finally:
                 trial.close()
-
-
-def _first_line(error: Exception) -> str:
-    said = str(error).splitlines()[0]
-    return "grew without bound" if "expected finite numbers" in said else said

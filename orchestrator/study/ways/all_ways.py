@@ -43,7 +43,9 @@ SAMPLING = (1.0 / 16.0, 0.25, 1.0, 4.0, 16.0)
 """Sample rates of what a run records, over the scene's own."""
 
 
-def ways_of(scene: Scene, *, speed: float = math.nan, rate: float = math.nan) -> list[Way]:
+def ways_of(
+    scene: Scene, *, speed: float = math.nan, rate: float = math.nan, whole: Scene | None = None
+) -> list[Way]:
     """Return the ways in which a scene can be simulated, and their settings.
 
     Parameters
@@ -54,6 +56,8 @@ def ways_of(scene: Scene, *, speed: float = math.nan, rate: float = math.nan) ->
         Of its impacts, typically, m/s: other laws that depend on it are made alike there.
     rate : float
         Samples per s of the time series that it asks for; NaN for none.
+    whole : Scene, optional
+        The scene with its transient, where `scene` begins after it: other models pass one of their own.
     """
     if scene.general is not None:
         return _general_ways(scene)
@@ -66,7 +70,7 @@ def ways_of(scene: Scene, *, speed: float = math.nan, rate: float = math.nan) ->
         *_plain_steps(scene),
         *_integrated(scene),
         *_read_off_samples(scene, rate),
-        *other_models(scene, speed),
+        *other_models(whole or scene, speed),
     ]
 
 

@@ -37,11 +37,11 @@ def test_a_way_that_keeps_more_samples_takes_more_memory() -> None:
     scene, given = Scene.from_dict(SAMPLED), {"rate": 60.0}
     names = [way.name for way in ways_of(scene, **given)]
     fused, rates = names.index("fused"), [k for k, name in enumerate(names) if name == "read off samples"]
-    memory = memory_of_ways(scene, given, [fused, rates[-1]])
+    memory = memory_of_ways(scene, given, [(fused, 1.0), (rates[-1], 1.0)])
     assert list(memory) == [fused, rates[-1]]
     assert 0 < memory[fused] < memory[rates[-1]]  # 960 samples a s for 126 s
 
 
 def test_memory_of_fmus_in_processes_of_their_own_is_not_told() -> None:
     guarded = SAMPLED | {"execution": {"how": "coupled", "guard": True}}
-    assert memory_of_ways(Scene.from_dict(guarded), {}, [0]) == {}
+    assert memory_of_ways(Scene.from_dict(guarded), {}, [(0, 1.0)]) == {}

@@ -1,0 +1,102 @@
+"""The budget of a study: processor time of all its processes, and how long its runs waited for a processor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import vibroimpact.orchestrator.study.clock as clock
+from vibroimpact.orchestrator.study.ways.way import Trial
+
+LEAST_BUDGET = 10.0
+"""Processor time, s, below which the reference and one run of each way leave nothing to time them by."""
+OUTSIDE = 2.0
+"""Processor time that a command takes beside its study, s: it loads the package, prints a table and draws a figure."""
+BUSY = 0.2
+"""Share of the time of runs spent waiting for a processor, above which other programs disturb what is measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What a study took of the machine.
+
+    Attributes
+    ----------
+    asked : float
+        Its budget: processor time, s.
+    processor : float
+        Processor time of all its processes, s.
+    wall : float
+        Wall time, s.
+    waited : float
+        Share of the wall time of the timed runs in which they waited for a processor.
+    """
+
+    asked: float = math.nan
+    processor: float = math.nan
+    wall: float = math.nan
+    waited: float = 0.0
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether other programs kept the runs from the processor."""
+        return self.waited > BUSY
+
+    def in_words(self) -> str:
+        """Return it in a sentence or two.
+
+        Examples
+        --------
+        >>> Effort(10.0, 9.2, 31.0, 0.6).in_words().split(". ")[0]
+        'Processor time: 9.2 s of 10 s, within 31 s'
+        >>> Effort(10.0, 9.2, 9.6, 0.01).in_words()
+        'Processor time: 9.2 s of 10 s, within 9.6 s.'
+        """
+        said = f"Processor time: {self.processor:.2g} s of {self.asked:g} s, within {self.wall:.2g} s."
+        if not self.is_busy:
+            return said
+        return (
+            f"{said} The machine was busy: runs waited for a processor in {100.0 * self.waited:.0f} % of their time. "
+            "Processor times are told; repeat the study where their spreads are large."
+        )
+
+
+class Budget:
+    """What a study may spend, and has spent, from the moment it is made.
+
+    Parameters
+    ----------
+    seconds : float
+        Processor time of all processes, s.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._spent, self._wall = clock.CLOCK.spent(), clock.CLOCK.wall()
+        self._processor = self._elapsed = 0.0
+
+    @property
+    def spent(self) -> float:
+        """Processor time spent so far, s."""
+        return clock.CLOCK.spent() - self._spent
+
+    @property
+    def left(self) -> float:
+        """Processor time left for the study, s; below 0 where more was spent than there was."""
+        return self.seconds - OUTSIDE - self.spent
+
+    def time(self, trial: Trial) -> float:
+        """Run a trial once; return its processor time, s."""
+        processor, wall = clock.CLOCK.timed(trial)
+        self.note(processor, wall)
+        return processor
+
+    def note(self, processor: float, wall: float) -> None:
+        """Note how long a run took, s: how much longer than its processor time says how busy the machine is."""
+        self._processor += processor
+        self._elapsed += wall
+
+    def effort(self) -> Effort:
+        """Return what the study has taken so far."""
+        waited = 1.0 - self._processor / self._elapsed if self._elapsed > 0.0 else 0.0
+        return Effort(self.seconds, self.spent, clock.CLOCK.wall() - self._wall, max(waited, 0.0))

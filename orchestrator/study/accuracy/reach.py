@@ -1,0 +1,203 @@
+"""The time of a scene that a budget lets all ways simulate: the transient passed once, the recording halved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import vibroimpact.orchestrator.study.clock as clock
+from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
+from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.run.carried_state import on_free_side
+from vibroimpact.orchestrator.run.parameters import oscillator_start
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.study.accuracy.budget import Budget
+from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, errors_of
+from vibroimpact.orchestrator.study.observation import LATE, Observation
+from vibroimpact.orchestrator.study.references import best_of, scales_of
+from vibroimpact.orchestrator.study.ways.driven import DrivenTrial
+from vibroimpact.orchestrator.study.ways.span import halved
+from vibroimpact.orchestrator.study.ways.way import Trial, opened_trial
+
+TRANSIENT_SHARE = 0.25
+"""Largest share of the budget for passing the transient."""
+RECORDING_SHARE, PERIOD_SHARE = 1.0 / 80.0, 1.0 / 12.0
+"""Largest share of the budget for a fused run of the recording; and for one of a period, which is not halved."""
+GENERAL_SHARE = 1.0 / 100.0
+"""Largest share of the budget for a run of a general scene: its reference costs 30 of them, its ways 50."""
+SAME_START = 1e-6
+"""Relative distance between the motion after a transient and that from its last state, below which both are one."""
+MOST_HALVINGS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Passed:
+    """A scene whose transient was passed once.
+
+    Attributes
+    ----------
+    scene : Scene
+        Starts with the state at the end of the transient; the scene itself where there is none to be passed so.
+    whole : Scene
+        Starts where the scene does.
+    observation : Observation or None
+        What a fused run of `whole` has shown; None where none was needed.
+    remark : str
+        Why each way passes the transient itself; empty where none does.
+    """
+
+    scene: Scene
+    whole: Scene
+    observation: Observation | None = None
+    remark: str = ""
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the ways begin after the transient."""
+        return self.observation is not None
+
+
+def within_reach(scene: Scene, budget: Budget) -> Scene:
+    """Return a scene that records as long as a run of it takes a small part of a budget: all, a half, a quarter, ...
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    budget : Budget
+
+    Raises
+    ------
+    UsageError
+        One forcing period takes too much; with the least budget.
+    """
+    share = RECORDING_SHARE if scene.general is None else GENERAL_SHARE
+    for _ in range(MOST_HALVINGS):
+        found = _observed_within(_without_transient(scene), share * budget.seconds)
+        if found.failure != LATE:
+            return scene
+        shorter = halved(scene)
+        if shorter is None:
+            break
+        scene = shorter
+    found = _observed_within(_without_transient(scene), PERIOD_SHARE * budget.seconds)
+    if found.failure == LATE:
+        _refuse(budget, PERIOD_SHARE, found, "one forcing period")
+    return scene
+
+
+def transient_passed(scene: Scene, budget: Budget) -> Passed:
+    """Pass the transient of a scene of the short form by the fused way, and keep the state at its end as a start.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    budget : Budget
+
+    Raises
+    ------
+    UsageError
+        The transient takes too much of the budget; with the least budget.
+    """
+    if scene.general is not None or scene.replay is not None or not _has_transient(scene):
+        return Passed(scene, scene)
+    trial = DrivenTrial(best_of(scene))
+    try:
+        with clock.CLOCK.limited(TRANSIENT_SHARE * budget.seconds):
+            found = trial.run()
+        if found.failure == LATE:
+            _refuse(budget, TRANSIENT_SHARE, found, "the transient")
+        kept = _started_with(scene, trial.start)
+        if kept is not None and not found.failure and _is_continued(kept, scene, found):
+            return Passed(kept, scene, found)
+    finally:
+        trial.close()
+    return Passed(
+        scene,
+        scene,
+        remark="one transient for all ways: the motion from the state at its end is not the one after it, so each way "
+        "passes it",
+    )
+
+
+def _observed_within(scene: Scene, seconds: float) -> Observation:
+    """Return what a run shows that is given up after so much processor time, s."""
+    is_short = scene.general is None and scene.replay is None
+    trial: Trial = DrivenTrial(best_of(scene)) if is_short else opened_trial(scene)
+    try:
+        with clock.CLOCK.limited(seconds):
+            return trial.run()
+    finally:
+        trial.close()
+
+
+def _has_transient(scene: Scene) -> bool:
+    return bool(scene.record.transient_periods if scene.period is not None else scene.record.transient_time)
+
+
+def _without_transient(scene: Scene) -> Scene:
+    if scene.general is not None or scene.replay is not None or not _has_transient(scene):
+        return scene
+    return scene.with_values(_no_transient(scene))
+
+
+def _no_transient(scene: Scene) -> Mapping[str, Any]:
+    return {"record.transient_periods": 0} if scene.period is not None else {"record.transient_time": 0.0}
+
+
+def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
+    """Return a scene that starts with a state, at forcing phase 0; None where no scene says it."""
+    changes: dict[str, Any] = dict(_no_transient(scene))
+    if isinstance(scene.body, OscillatorBody):
+        start = oscillator_start(scene, state)
+        changes |= {f"body.{name}": value for name, value in start.items()}
+    else:
+        free = on_free_side(scene, scene.body, state)
+        half = len(free) // 2
+        changes |= {"body.displacement_start": list(free[:half]), "body.velocity_start": list(free[half:])}
+    if scene.forcing is not None and scene.period is not None:
+        changes["forcing.phase"] = 0.0
+    try:
+        return scene.with_values(changes)
+    except SceneError:
+        return None
+
+
+def _is_continued(kept: Scene, whole: Scene, found: Observation) -> bool:
+    """Return whether a scene that starts with a state shows what came after that state in the whole motion."""
+    best, before = DrivenTrial(best_of(kept)), scales_of(whole).window[0]
+    try:
+        expected = best.run()
+    except ComponentError:
+        return False
+    finally:
+        best.close()
+    impacts = found.impacts - (before, 0.0, 0.0)
+    moved, scales = replace(found, impacts=impacts), scales_of(kept)
+    first = errors_of(expected, moved, scales, impacts=FIRST_IMPACTS)
+    compared = first if len(impacts) else errors_of(expected, moved, scales)
+    worst = compared.worst()
+    return not compared.failure and not (math.isfinite(worst) and worst > SAME_START)
+
+
+def _refuse(budget: Budget, share: float, found: Observation, what: str) -> None:
+    least = budget.seconds / found.reached if found.reached > 0.0 else math.inf
+    needed = (
+        f"about {_rounded_up(least):g} s or more"
+        if math.isfinite(least)
+        else f"far more than {budget.seconds:g} s"
+    )
+    raise UsageError(
+        f"{option('budget')}: expected {needed} of processor time, got {budget.seconds:g}: {what} takes more than "
+        f"{share * budget.seconds:.2g} s by the fused way, of all ways the cheapest."
+    )
+
+
+def _rounded_up(seconds: float) -> float:
+    """Return a time with two digits, not less, s."""
+    unit = 10.0 ** (math.floor(math.log10(seconds)) - 1)
+    return math.ceil(seconds / unit) * unit

@@ -1,0 +1,184 @@
+"""One way of simulating a scene, tried: over all of its time, or the first half, quarter, ... until it ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import vibroimpact.orchestrator.study.clock as clock
+from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.accuracy.measured import SHORT, Measured
+from vibroimpact.orchestrator.study.accuracy.reach import Passed
+from vibroimpact.orchestrator.study.balance import balance_of
+from vibroimpact.orchestrator.study.errors import Errors, errors_of, no_errors
+from vibroimpact.orchestrator.study.observation import LATE, Observation
+from vibroimpact.orchestrator.study.references import Reference, best_of, scales_of
+from vibroimpact.orchestrator.study.ways.trials import far_off
+from vibroimpact.orchestrator.study.ways.way import Trial, Way, opened_part
+
+COUNTED = 0.125
+"""Share of the limit of a run above which its calls are not counted: that takes several times as long."""
+PART_OF_REACHED = 0.5
+"""Largest next part of the time, over the part that the run had reached that was given up."""
+UNKNOWN_REACHED = 0.25
+"""Next part of the time, over the last one, after a run that does not tell how far it came."""
+LEAST_PART = 2.0**-30
+"""Part of the studied time below which a way is given up for good."""
+
+
+class References:
+    """What each way is compared with over each part of the time; each of these runs once.
+
+    Parameters
+    ----------
+    reference : Reference
+        Of the studied scene, over all of its time.
+    passed : Passed
+        How its transient was passed.
+    """
+
+    def __init__(self, reference: Reference, passed: Passed) -> None:
+        self.reference = reference
+        self._passed = passed
+        self._found: dict[tuple[str, float], Reference] = {(reference.best.text, 1.0): reference}
+        if passed.observation is not None:
+            self._own = best_of(passed.whole)
+            self._keep(self._own, 1.0, passed.observation)
+
+    def scene_for(self, way: Way) -> Scene:
+        """Return the scene whose run is the reference of a way: the finest of its kind, with its own transient."""
+        if way.against is not None:
+            return way.against
+        own_transient = way.model and way.scene is not None and self._passed.is_kept
+        return self._own if own_transient else self.reference.best
+
+    def length_of(self, way: Way) -> float:
+        """Return the studied time over that of a way."""
+        return self.reference.scales.window[1] / scales_of(self.scene_for(way)).window[1]
+
+    def of(self, way: Way, part: float, most: float) -> Reference:
+        """Return the reference of a way over the first part of its time.
+
+        Another model, or a finer one, is given up after `most` seconds of processor time: its observation says so.
+        """
+        scene = self.scene_for(way)
+        found = self._found.get((scene.text, part))
+        if found is not None:
+            return found
+        trial = opened_part(scene, part)
+        try:
+            with clock.CLOCK.limited(math.inf if scene is self.reference.best else most):
+                return self._keep(scene, part, trial.run())
+        finally:
+            trial.close()
+
+    def _keep(self, scene: Scene, part: float, observation: Observation) -> Reference:
+        found = replace(self.reference, observation=observation, scales=scales_of(scene, part))
+        if observation.failure != LATE:  # a way that may take longer tries again
+            self._found[scene.text, part] = found
+        return found
+
+
+def tried(way: Way, references: References, most: float) -> tuple[Measured, Trial | None]:
+    """Run a way, and compare what it shows; over half of the time, a quarter, ... until it ends.
+
+    Parameters
+    ----------
+    way : Way
+    references : References
+    most : float
+        Processor time after which a run is given up, s.
+
+    Returns
+    -------
+    one : Measured
+    trial : Trial or None
+        None where the way failed.
+    """
+    part = 1.0
+    while True:
+        one, trial, reached = _tried_over(way, part, references, most)
+        part = shorter_part(part, reached)
+        if one.errors.failure != LATE or part < LEAST_PART:
+            return one, trial
+
+
+def shorter_part(part: float, reached: float) -> float:
+    """Return the next part to try, a power of two, after a run of one was given up that reached so much of it.
+
+    Examples
+    --------
+    >>> shorter_part(1.0, 0.3), shorter_part(0.25, 0.9), shorter_part(1.0, float("nan"))
+    (0.125, 0.0625, 0.25)
+    """
+    if not reached > 0.0:
+        return UNKNOWN_REACHED * part
+    return float(part * min(0.5, 2.0 ** math.floor(math.log2(PART_OF_REACHED * min(reached, 1.0)))))
+
+
+def _tried_over(
+    way: Way, part: float, references: References, most: float
+) -> tuple[Measured, Trial | None, float]:
+    """Run a way over a part; return how far it came, too."""
+    try:
+        trial = way.open(None, part)
+    except (ComponentError, SceneError, DatasetError) as error:
+        return Measured(way, no_errors(_first_line(error)), part), None, math.nan
+    try:
+        with clock.CLOCK.limited(most):
+            found, processor, wall = clock.CLOCK.observed(trial)
+        reference = references.of(way, part, most)
+    except ComponentError as error:
+        trial.close()
+        return Measured(way, no_errors(_first_line(error)), part), None, math.nan
+    with clock.CLOCK.limited(most):
+        one = _measured(way, part, found, reference, references.length_of(way))
+    one.first, one.first_wall = processor, wall
+    if one.errors.failure == LATE or found.failure:
+        trial.close()
+        return one, None, found.reached
+    with clock.CLOCK.limited(most):
+        _measure_more(one, processor, most)
+    return one, trial, math.nan
+
+
+def _measured(way: Way, part: float, found: Observation, reference: Reference, length: float) -> Measured:
+    """Return what a run has shown, compared."""
+    if way.scene is not None and part == 1.0 and not (found.failure or reference.observation.failure):
+        found = replace(found, energy_balance=balance_of(way.scene))
+    return Measured(
+        way,
+        _compared(found, reference),
+        part,
+        length,
+        impacts=len(found.impacts),
+        energy_residual=found.energy_residual,
+        variance=found.variance,
+    )
+
+
+def _compared(found: Observation, reference: Reference) -> Errors:
+    if reference.observation.failure == LATE:
+        return no_errors(LATE)
+    errors = errors_of(found, reference.observation, reference.scales)
+    fell = not found.failure and far_off(found, reference.observation)
+    return no_errors("fell through") if fell else errors
+
+
+def _measure_more(one: Measured, processor: float, most: float) -> None:
+    """Count the calls of a way that takes little; run a way over less that has not simulated all."""
+    way = one.way
+    if one.is_extrapolated:
+        trial = way.open(None, SHORT * one.part)
+        try:
+            one.short = clock.CLOCK.timed(trial)[0]
+        finally:
+            trial.close()
+    elif processor < COUNTED * most:
+        one.calls = clock.CLOCK.calls(way)
+
+
+def _first_line(error: Exception) -> str:
+    said = str(error).splitlines()[0]
+    return "grew without bound" if "expected finite numbers" in said else said
