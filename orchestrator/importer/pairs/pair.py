@@ -122,6 +122,7 @@ class Pair:
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
         self._overlap = self._opening = 0.0  # of bodies at rest, m
+        self._most_force = 0.0  # likewise, N
         self.arrived = self.closed = self._pressed = self.begins_pressed = False
         gap = self.look().gap
         if not gap >= -self._scale.room(time) and not self.yields:
@@ -262,7 +263,7 @@ class Pair:
             The bodies have come deep into each other: the forces of several at rest did not agree.
         """
         end = self._time + size
-        deep = DEEP * self._scale.displacement + self._room
+        deep = DEEP * max(self._scale.displacement, self._held_back()) + self._room
         if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
         if self.rests:
@@ -270,6 +271,18 @@ class Pair:
             self._overlap, self._opening = max(self._overlap, -gap), max(self._opening, gap)
         met = abs(end - self._agreed) <= precision_at(end) or self._touches(self.look())
         self.arrived = self.yields and not self.closed and met
+
+    def _held_back(self) -> float:
+        """Return how far the force of rests has kept the bodies from moving in a longest step, m; 0 without a rest.
+
+        Bodies that rest on each other from the start have not moved: nothing else says what is far for them.
+        """
+        if self.rests:
+            self._most_force = max(self._most_force, abs(self._force.value))
+        if not self._most_force:
+            return 0.0
+        longest = self._longest if math.isfinite(self._longest) else self._longest_step
+        return 0.5 * self._most_force / self._reduced * longest * longest
 
     def remark(self) -> str:
         """Return what a reader of the results must know of bodies at rest; empty where there is nothing."""

@@ -128,6 +128,27 @@ def test_step_revision_finds_rigid_stops_to_rounding_and_follows_yielding_ones_a
     assert observed_order(1.0 / steps, errors) == pytest.approx(2.0, abs=0.2)
 
 
+def test_step_revision_follows_a_body_that_is_pressed_on_its_stop_from_the_start() -> None:
+    tables = {
+        "body": {"mass": 1.0, "stiffness": 0.5, "damping_ratio": 0.1},
+        "forcing": {"amplitude": 0.5, "angular_frequency": 2.3},
+        "stop": [{"position": 0.0, "restitution": 0.9}],
+        "record": {"recorded_periods": 2},
+    }
+    scene = studied_scene(Scene.from_dict(tables))
+    assert scene.period is not None
+    found, expected = RevisedTrial(scene, 0.02 * scene.period).run(), reference_of(scene).observation
+    assert found.final == pytest.approx(expected.final, rel=1e-4)
+
+
+def test_step_revision_gives_an_impulse_that_is_small_beside_the_speed_of_the_other_mass() -> None:
+    scene = studied_scene(load_scene(EXAMPLES / "thesis" / "figure_6_5b.toml"))
+    assert scene.period is not None
+    end = reference_of(scene).scales.window[1]
+    found = RevisedTrial(scene, 0.2 * scene.period, part=30.5 / end).run()  # there is such an impact at 30.09
+    assert found.failure == ""
+
+
 CHAIN: dict[str, Any] = {
     "body": {"kind": "chain", "masses": [2.0, 1.0], "stiffnesses": [3.0, 1.0], "dampings": 0.1},
     "forcing": {"amplitude": [0.0, 1.0], "angular_frequency": 0.8},
