@@ -19,14 +19,17 @@ _NEEDED = ("cost", "error", "name", "failure", "on_front", "is_model")
 _ROUNDING = 1e-16
 """Error below which nothing is told apart; an error of 0 is drawn there."""
 _ROWS = 12
-"""mm: a row of names below the panel."""
+"""mm: two rows of names below the panel."""
+_SIGNS = 3
+"""Rows of names for what is no way: crosses, rings, the error of the reference."""
 
 
 def draw_accuracy(dataset: xr.Dataset) -> Figure:
     """Draw the error of each way over its cost, a line for each way and a mark for each setting.
 
     The line of those that no other way beats is drawn behind them; what failed is a cross at the top, where its time
-    went; another model of the same thing is hollow.
+    went; another model of the same thing is hollow. A way that simulated a part of the time has a ring: its cost is
+    extrapolated, and its error is that of the part.
 
     Parameters
     ----------
@@ -46,7 +49,7 @@ def draw_accuracy(dataset: xr.Dataset) -> Figure:
     refuse_missing(missing_from(dataset, _NEEDED), "what `vibroimpact accuracy` writes")
     names = list(dict.fromkeys(str(name) for name in dataset["name"].values))
     with page_style():
-        figure = canvas(80 + _ROWS * len(names) / 2)
+        figure = canvas(80 + _ROWS * (len(names) + _SIGNS) / 2)
         axis = figure.subplots()
         errors = np.maximum(dataset["error"].values, _ROUNDING)
         good = np.isfinite(errors) & (dataset["failure"].values == "")
@@ -54,12 +57,16 @@ def draw_accuracy(dataset: xr.Dataset) -> Figure:
         _draw_front(axis, dataset, errors)
         for place, name in enumerate(names):
             _draw_way(axis, dataset, errors, good, name, place, top)
+        _explain_failures(axis, dataset)
+        _ring_parts(axis, dataset, errors, good)
         if dataset.attrs.get("reference_error", 0.0) > 0.0:
-            axis.axhspan(0.1 * _ROUNDING, float(dataset.attrs["reference_error"]), color="0.9", zorder=-2)
+            known = float(dataset.attrs["reference_error"])
+            label = "below what the reference is known to"
+            axis.axhspan(0.1 * _ROUNDING, known, color="0.9", zorder=-2, label=label)
         tolerance = float(dataset.attrs.get("tolerance", np.nan))
         if tolerance > 0.0:
-            axis.axhline(tolerance, color=MARK, linewidth=0.6, linestyle=":")
-        axis.set(xscale="log", yscale="log", xlabel="wall time of a run (s)", ylabel=_label(dataset))
+            axis.axhline(tolerance, color=MARK, linewidth=0.6, linestyle=":", label="tolerance asked for")
+        axis.set(xscale="log", yscale="log", xlabel="processor time of a run (s)", ylabel=_label(dataset))
         _show_whole_decades(axis, dataset["cost"].values)
         _write_scores(axis, dataset, errors)
         axis.set_ylim(0.3 * _ROUNDING, 10.0 * top)
@@ -93,6 +100,24 @@ def _write_scores(axis: Axes, dataset: xr.Dataset, errors: np.ndarray) -> None:
             textcoords="offset points",
             ha="center",
             fontsize=5,
+        )
+
+
+def _ring_parts(axis: Axes, dataset: xr.Dataset, errors: np.ndarray, good: np.ndarray) -> None:
+    """Draw a ring around each way that simulated a part of the time."""
+    if "part" not in dataset:
+        return
+    its = good & (dataset["part"].values < 1.0)
+    if its.any():
+        axis.plot(
+            *(dataset["cost"].values[its], errors[its]),
+            linestyle="none",
+            marker="o",
+            markersize=7.0,
+            markerfacecolor="none",
+            color="0.4",
+            markeredgewidth=0.6,
+            label="extrapolated from a part of the time",
         )
 
 
@@ -140,6 +165,16 @@ def _draw_way(
         "linewidth": 0.8,
     }
     shown = its & good
+    if "part" in dataset:  # errors of parts of the time are no line with those of all of it
+        parts = shown & (dataset["part"].values < 1.0)
+        shown = shown & ~parts
+        axis.plot(
+            cost[parts],
+            errors[parts],
+            linestyle="none",
+            markerfacecolor="white" if hollow else colour,
+            **style,
+        )
     axis.plot(
         cost[shown],
         errors[shown],
@@ -150,3 +185,10 @@ def _draw_way(
     )
     failed = its & ~good & np.isfinite(cost)
     axis.plot(cost[failed], np.full(failed.sum(), top), "x", color=colour, markersize=5.0)
+
+
+def _explain_failures(axis: Axes, dataset: xr.Dataset) -> None:
+    """Say in the legend what a cross is, where there is one."""
+    if (dataset["failure"].values != "").any():
+        label = "no error: impacts missed, or no end"
+        axis.plot([], [], "x", color="0.4", markersize=5.0, linestyle="none", label=label)
