@@ -100,7 +100,7 @@ def _shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
 
 def _say_tried(one: Measured) -> None:
     said = one.errors.failure or f"error {one.error('all'):.1e}"
-    say(f"  {one.way.label}: {said}")
+    say(f"  {one.way.label}: {said}{_part_in_words(one.part)}")
 
 
 def table_of(
@@ -133,7 +133,7 @@ def table_of(
         ">spread",
         *((">an impact", ">calls", ">memory") if wide else ()),
         *((">accounts for",) if scored else ()),
-        "<what is wrong",
+        "<remark",
     )
     for one in measured:
         spread = (max(one.seconds) - min(one.seconds)) / one.each if len(one.seconds) > 1 else math.nan
@@ -153,14 +153,14 @@ def table_of(
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
             *(each if wide else ()),
             *((f"{one.variance:.2f} %",) if scored else ()),
-            "; ".join(filter(None, (one.errors.failure, _part_in_words(one.part)))),
+            f"{one.errors.failure}{_part_in_words(one.part)}".removeprefix(", "),
         )
     return rows
 
 
 def _part_in_words(part: float) -> str:
-    """Return which part of the time was simulated, a power of two; empty for all of it."""
-    return "" if part == 1.0 else f"first 1/{1.0 / part:.0f} only"
+    """Return which part of the time was simulated, a power of two, after a comma; empty for all of it."""
+    return "" if part == 1.0 else f", first 1/{1.0 / part:.0f} only"
 
 
 def _known_duration(seconds: float) -> str:

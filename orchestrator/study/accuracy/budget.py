@@ -48,16 +48,17 @@ class Effort:
         Examples
         --------
         >>> Effort(10.0, 9.2, 31.0, 0.6).in_words().split(". ")[0]
-        'Processor time: 9.2 s of 10 s, within 31 s'
+        'Processor time: 9.2 s of the 10 s asked for, in 31 s of wall time'
         >>> Effort(10.0, 9.2, 9.6, 0.01).in_words()
-        'Processor time: 9.2 s of 10 s, within 9.6 s.'
+        'Processor time: 9.2 s of the 10 s asked for, in 9.6 s of wall time.'
         """
-        said = f"Processor time: {self.processor:.2g} s of {self.asked:g} s, within {self.wall:.2g} s."
+        asked = f"{self.processor:.2g} s of the {self.asked:g} s asked for"
+        said = f"Processor time: {asked}, in {self.wall:.2g} s of wall time."
         if not self.is_busy:
             return said
         return (
             f"{said} The machine was busy: runs waited for a processor in {100.0 * self.waited:.0f} % of their time. "
-            "Processor times are told; repeat the study where their spreads are large."
+            "Costs are processor times; repeat the study where their spreads are large."
         )
 
 

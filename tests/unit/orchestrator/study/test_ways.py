@@ -65,16 +65,16 @@ def test_the_first_part_of_a_motion_is_that_of_all_of_it(kind: str) -> None:
 )
 def test_a_run_is_given_up_by_the_clock_that_limits_it_and_says_how_far_it_came(kind: str) -> None:
     tables, opened = TRIALS[kind]
-    record = tables["record"] | {"recorded_periods": 4000}
+    record = tables["record"] | {"recorded_periods": 40_000}
     trial, time = opened(Scene.from_dict(tables | {"record": record}), 1.0), 0.0
 
     def look() -> float:
         nonlocal time
-        time += 1.0
+        time += 0.01
         return time
 
     try:
-        with runs_limited(20.0, look):
+        with runs_limited(0.015, look):
             found = trial.run()
     finally:
         trial.close()
