@@ -28,6 +28,8 @@ RECORDING_SHARE, PERIOD_SHARE = 1.0 / 80.0, 1.0 / 12.0
 """Largest share of the budget for a fused run of the recording; and for one of a period, which is not halved."""
 GENERAL_SHARE = 1.0 / 100.0
 """Largest share of the budget for a run of a general scene: its reference costs 30 of them, its ways 50."""
+GUARDED_SHARE, LEAST_GUARDED = 0.04, 0.25
+"""Largest share of the budget, in wall time, for a run in another process; and the least wall time of such a run, s."""
 SAME_START = 1e-6
 """Relative distance between the motion after a transient and that from its last state, below which both are one."""
 MOST_HALVINGS = 40
@@ -76,14 +78,14 @@ def within_reach(scene: Scene, budget: Budget) -> Scene:
     """
     share = RECORDING_SHARE if scene.general is None else GENERAL_SHARE
     for _ in range(MOST_HALVINGS):
-        found = _observed_within(_without_transient(scene), share * budget.seconds)
+        found = observed_within(_without_transient(scene), share * budget.seconds)
         if found.failure != LATE:
             return scene
         shorter = halved(scene)
         if shorter is None:
             break
         scene = shorter
-    found = _observed_within(_without_transient(scene), PERIOD_SHARE * budget.seconds)
+    found = observed_within(_without_transient(scene), PERIOD_SHARE * budget.seconds)
     if found.failure == LATE:
         _refuse(budget, PERIOD_SHARE, found, "one forcing period")
     return scene
@@ -124,15 +126,26 @@ def transient_passed(scene: Scene, budget: Budget) -> Passed:
     )
 
 
-def _observed_within(scene: Scene, seconds: float) -> Observation:
-    """Return what a run shows that is given up after so much processor time, s."""
+def observed_within(scene: Scene, seconds: float) -> Observation:
+    """Return the observation of a run that is given up after so much processor time, s: fused where that can be."""
     is_short = scene.general is None and scene.replay is None
-    trial: Trial = DrivenTrial(best_of(scene)) if is_short else opened_trial(scene)
+    trial: Trial = (
+        DrivenTrial(best_of(scene)) if is_short else opened_trial(limited_elsewhere(scene, seconds))
+    )
     try:
         with clock.CLOCK.limited(seconds):
             return trial.run()
     finally:
         trial.close()
+
+
+def limited_elsewhere(scene: Scene, seconds: float) -> Scene:
+    """Return a scene whose runs in another process, where it asks for one, are given up after some wall time, s."""
+    is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+    if not is_guarded:
+        return scene
+    own, most = scene.execution.deadline, max(LEAST_GUARDED, seconds)
+    return scene.with_values({"execution.deadline": most if own is None else min(own, most)})
 
 
 def _has_transient(scene: Scene) -> bool:

@@ -18,7 +18,15 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.accuracy.budget import Budget
 from vibroimpact.orchestrator.study.accuracy.choice import cheapest
 from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
-from vibroimpact.orchestrator.study.accuracy.reach import Passed, transient_passed, within_reach
+from vibroimpact.orchestrator.study.accuracy.reach import (
+    GUARDED_SHARE,
+    RECORDING_SHARE,
+    Passed,
+    limited_elsewhere,
+    observed_within,
+    transient_passed,
+    within_reach,
+)
 from vibroimpact.orchestrator.study.accuracy.refusals import (
     refuse_misuse,
     refuse_one_way,
@@ -28,6 +36,7 @@ from vibroimpact.orchestrator.study.accuracy.trying import References, tried
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.memory import UNKNOWN
+from vibroimpact.orchestrator.study.observation import LATE
 from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import (
     DISTURBANCE,
@@ -59,8 +68,6 @@ MOST_ROUNDS = 15
 """How often each way is timed at most, in turn with the others."""
 EACH_SHARE = 0.1
 """Share of the time left, above which a run of a way is too dear to be timed again."""
-GUARDED_SHARE, LEAST_GUARDED = 0.04, 0.5
-"""Share of the budget, in wall time, after which a run in another process is given up; and the least, s."""
 REPLICATES = 6
 """Runs of chaotic motion, each from a slightly different number, that tell the sampling error of its statistics."""
 MOST_HALVINGS = 24
@@ -114,12 +121,15 @@ def study_accuracy(
     statistical = passed.scene if reference.chaotic else None
     orbit = _orbit_of(reference, whole, passed)
     if reference.chaotic:
-        first = first_impacts(whole, reference)
+        first = first_impacts(whole, spends)
         passed = Passed(first, first)
         reference = replace(reference_of(first), chaotic=True, sensitivity=reference.sensitivity)
     refuse_vague_reference(tolerance, quantity, reference)
     given = {"speed": _typical_speed(reference), "rate": _rate_of(scene), "whole": passed.whole}
-    ways = ways_of(_limited(passed.scene, budget), **given | {"whole": _limited(passed.whole, budget)})
+    limited, limited_whole = (
+        limited_elsewhere(one, GUARDED_SHARE * budget) for one in (passed.scene, passed.whole)
+    )
+    ways = ways_of(limited, **given | {"whole": limited_whole})
     found = _measured(ways, References(reference, passed), passed, given, spends, told, statistical)
     return Study(
         passed.scene,
@@ -201,15 +211,6 @@ def _orbit_of(reference: Reference, whole: Scene, passed: Passed) -> str:
     return orbit_of(found, whole.period, scales_of(whole).window)
 
 
-def _limited(scene: Scene, budget: float) -> Scene:
-    """Return a scene whose runs in another process are given up after some wall time, or earlier where it says so."""
-    is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
-    if not is_guarded:
-        return scene
-    own, seconds = scene.execution.deadline, max(LEAST_GUARDED, GUARDED_SHARE * budget)
-    return scene.with_values({"execution.deadline": seconds if own is None else min(own, seconds)})
-
-
 def _remarks(alone: Scene, studied: Scene, passed: Passed) -> list[str]:
     """Return what of a scene's time is left out, and why."""
     remarks = [passed.remark] if passed.remark else []
@@ -222,17 +223,25 @@ def _remarks(alone: Scene, studied: Scene, passed: Passed) -> list[str]:
     return remarks
 
 
-def first_impacts(scene: Scene, reference: Reference) -> Scene:
-    """Return a scene that ends after its first impacts, from its start: all that chaos leaves comparable."""
+def first_impacts(scene: Scene, spends: Budget) -> Scene:
+    """Return a scene that ends after its first impacts, from its start: all that chaos leaves comparable.
+
+    It ends earlier where a run takes too much of the budget, as one of rare impacts does.
+    """
     if scene.general is not None:
         return _comparable(scene)
     if scene.period is None:
         return scene
     periods = 1
+    short = scene.with_values({"record.transient_periods": 0, "record.recorded_periods": periods})
     while periods < MOST_FIRST_PERIODS:
         periods *= 2
-        short = scene.with_values({"record.transient_periods": 0, "record.recorded_periods": periods})
-        if len(observed(short).impacts) >= FIRST_IMPACTS:
+        longer = short.with_values({"record.recorded_periods": periods})
+        found = observed_within(longer, RECORDING_SHARE * spends.seconds)
+        if found.failure == LATE:
+            break
+        short = longer
+        if len(found.impacts) >= FIRST_IMPACTS:
             break
     return short
 

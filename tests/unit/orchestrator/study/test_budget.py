@@ -16,9 +16,9 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET, Budget
-from vibroimpact.orchestrator.study.accuracy.reach import transient_passed
+from vibroimpact.orchestrator.study.accuracy.reach import limited_elsewhere, transient_passed
 from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
-from vibroimpact.orchestrator.study.accuracy.study import studied_scene
+from vibroimpact.orchestrator.study.accuracy.study import MOST_FIRST_PERIODS, first_impacts, studied_scene
 from vibroimpact.orchestrator.study.observation import LATE, Observation
 from vibroimpact.orchestrator.study.processor import processor_time_of_all
 from vibroimpact.orchestrator.study.ways import all_ways
@@ -178,6 +178,27 @@ def test_a_recording_that_takes_too_much_is_cut_and_said_so() -> None:
     study = studied(long, TickingClock(0.05))
     assert study.scene.record.recorded_periods < 2**15
     assert any(remark.startswith("all but the first ") for remark in study.remarks)
+
+
+def test_first_impacts_are_looked_for_within_the_budget() -> None:
+    rare = Scene.from_dict(P11 | {"forcing": {"amplitude": 1e-3, "angular_frequency": 1.0}})
+    with pytest.MonkeyPatch.context() as patch:
+        tick_the_clock(patch, TickingClock(1.0))
+        assert first_impacts(rare, Budget(LEAST_BUDGET)).record.recorded_periods == 1
+        tick_the_clock(patch, TickingClock(0.0))
+        assert first_impacts(rare, Budget(LEAST_BUDGET)).record.recorded_periods == MOST_FIRST_PERIODS
+        hits = first_impacts(Scene.from_dict(P11), Budget(LEAST_BUDGET))
+    assert hits.record.recorded_periods == 16
+
+
+def test_runs_in_other_processes_are_given_up_by_wall_time_or_earlier_where_the_scene_says_so() -> None:
+    execution = {"how": "coupled", "guard": True}
+    guarded = Scene.from_dict(P11 | {"execution": execution})
+    assert limited_elsewhere(guarded, 1.0).execution.deadline == 1.0
+    sooner = Scene.from_dict(P11 | {"execution": execution | {"deadline": 0.5}})
+    assert limited_elsewhere(sooner, 1.0).execution.deadline == 0.5
+    here = Scene.from_dict(P11)
+    assert limited_elsewhere(here, 1.0) is here
 
 
 @pytest.mark.parametrize(("slowness", "is_busy"), [(1.0, False), (4.0, True)])
