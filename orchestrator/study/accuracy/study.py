@@ -125,7 +125,11 @@ def study_accuracy(
         passed = Passed(first, first)
         reference = replace(reference_of(first), chaotic=True, sensitivity=reference.sensitivity)
     refuse_vague_reference(tolerance, quantity, reference)
-    given: dict[str, Any] = {"speed": _typical_speed(reference), "rate": _rate_of(scene), "whole": passed.whole}
+    given: dict[str, Any] = {
+        "speed": _typical_speed(reference),
+        "rate": _rate_of(scene),
+        "whole": passed.whole,
+    }
     limited, limited_whole = (
         limited_elsewhere(one, GUARDED_SHARE * budget) for one in (passed.scene, passed.whole)
     )
