@@ -26,8 +26,8 @@ TRANSIENT_SHARE = 0.25
 """Largest share of the budget for passing the transient."""
 RECORDING_SHARE, PERIOD_SHARE = 1.0 / 80.0, 1.0 / 12.0
 """Largest share of the budget for a fused run of the recording; and for one of a period, which is not halved."""
-GENERAL_SHARE = 1.0 / 100.0
-"""Largest share of the budget for a run of a general scene: its reference costs 30 of them, its ways 50."""
+GENERAL_SHARE = 1.0 / 250.0
+"""Largest share of the budget for a run of a general scene: the reference and its parts cost 60 to 100."""
 GUARDED_SHARE, LEAST_GUARDED = 0.04, 0.25
 """Largest share of the budget, in wall time, for a run in another process; and the least wall time of such a run, s."""
 SAME_START = 1e-6
