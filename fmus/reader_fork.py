@@ -7,6 +7,7 @@ other threads; one that waits for a lock of theirs is given up, and says nothing
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import threading
@@ -85,6 +86,7 @@ def read_in_fork(order: Order) -> Answer | None:
     else:
         if process == 0:
             try:
+                gc.freeze()  # objects of this process end with it, not in a copy of it
                 _leave_all_files(answer)
                 read_and_end(given, parent, _ANSWER)
             finally:

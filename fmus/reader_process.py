@@ -1,8 +1,8 @@
 """Lets a process of its own read a file of a stranger; its answer is JSON and raw bytes, never a pickle.
 
 A library may crash on damaged bytes, never end, or take all memory: `reader_child` is where it does so. On Linux a fork
-of this process reads (`reader_fork`). Elsewhere, and where a fork waits in vain, a server does: it starts with the
-first file, serves all that follow, and ends by itself when none comes.
+of this process reads (`reader_fork`). Elsewhere, and where a fork waits in vain or crashes, a server does: it starts
+with the first file, serves all that follow, and ends by itself when none comes.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import atexit
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -36,12 +37,17 @@ _CHILD = Path(__file__).with_name("reader_child.py")
 
 
 def read_apart(order: Order) -> Answer:
-    """Let a process of its own read a file: a fork of this one, or where that waits in vain, one of the server's.
+    """Let a process of its own read a file: a fork of this one, or where that says nothing sure, one of the server's.
 
     Any number of threads may ask.
     """
     answer = read_in_fork(order) if FORKS else None
-    return answer or _server.ask(order)
+    return _server.ask(order) if answer is None or _has_crashed(answer) else answer
+
+
+def _has_crashed(answer: Answer) -> bool:
+    """Return whether a fork has crashed: what it has of this process may be why, so that a fresh one tells."""
+    return answer.verdict == "died" and answer.error != str(int(signal.SIGKILL))
 
 
 class ReaderServer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import signal
 import sys
@@ -88,6 +89,21 @@ def test_whatever_a_file_does_to_it_is_an_answer(
     answer = read(what)
     assert answer.verdict == verdict
     assert error is None or answer.error == error
+
+
+def test_what_this_process_has_not_freed_yet_is_not_freed_in_a_fork(read: Callable[..., Answer]) -> None:
+    """An object of a library that was freed there, whose files and threads the fork lacks, has crashed it."""
+    here = os.getpid()
+
+    class Held:
+        def __del__(self) -> None:
+            if os.getpid() != here:
+                os.kill(os.getpid(), signal.SIGSEGV)
+
+    held = Held()
+    held.itself = held  # type: ignore[attr-defined]
+    del held
+    assert read(lambda path, options: (gc.collect(), ())).verdict == "read"
 
 
 def test_a_loop_that_does_not_end_is_late(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vibroimpact.fmus import reader_process
-from vibroimpact.fmus.reader_process import Order, ReaderServer
+from vibroimpact.fmus.reader_process import Answer, Order, ReaderServer
 
 CHILD = """
 import json, os, sys
@@ -93,3 +93,25 @@ def test_a_loop_that_does_not_end_and_a_memory_without_end_are_answers(
     order = replace(ORDER, seconds=0.3)
     assert server.ask(replace(order, options={"size": 0})).verdict in ("late", "raised")
     assert server.ask(replace(ORDER, memory=1 << 29)).error == "MemoryError"
+
+
+@pytest.mark.parametrize(
+    ("of_fork", "asks"),
+    [
+        (None, True),
+        (Answer("died", error="11"), True),
+        (Answer("died"), True),
+        (Answer("died", error="9"), False),
+        (Answer("late", error="27"), False),
+        (Answer("raised", error="ValueError"), False),
+        (Answer("read"), False),
+    ],
+)
+def test_a_fresh_process_tells_whether_a_crash_is_of_the_file(
+    of_fork: Answer | None, asks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of_server = Answer("read", facts="by the server")
+    monkeypatch.setattr(reader_process, "FORKS", True)
+    monkeypatch.setattr(reader_process, "read_in_fork", lambda order: of_fork)
+    monkeypatch.setattr(reader_process._server, "ask", lambda order: of_server)
+    assert reader_process.read_apart(ORDER) is (of_server if asks else of_fork)
