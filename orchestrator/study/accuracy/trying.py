@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import vibroimpact.orchestrator.study.clock as clock
@@ -172,7 +173,9 @@ def _measure_more(one: Measured, processor: float, most: float) -> None:
     if one.is_extrapolated:
         trial = way.open(None, SHORT * one.part)
         try:
-            one.short = clock.CLOCK.timed(trial)[0]
+            # an output may have no value yet where so little is simulated: that of the last impact before the first
+            with suppress(ComponentError):
+                one.short = clock.CLOCK.timed(trial)[0]
         finally:
             trial.close()
     elif processor < COUNTED * most:
@@ -181,4 +184,4 @@ def _measure_more(one: Measured, processor: float, most: float) -> None:
 
 def _first_line(error: Exception) -> str:
     said = str(error).splitlines()[0]
-    return "grew without bound" if "expected finite numbers" in said else said
+    return "grew without bound" if "expected finite numbers" in said else said.rstrip(".")

@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 from support.ticking_clock import TickingClock, tick_the_clock
 
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy, trying
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET, Budget
 from vibroimpact.orchestrator.study.accuracy.reach import limited_elsewhere, transient_passed
 from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
 from vibroimpact.orchestrator.study.accuracy.study import MOST_FIRST_PERIODS, first_impacts, studied_scene
+from vibroimpact.orchestrator.study.errors import no_errors
 from vibroimpact.orchestrator.study.observation import LATE, Observation
 from vibroimpact.orchestrator.study.processor import processor_time_of_all
 from vibroimpact.orchestrator.study.ways import all_ways
 from vibroimpact.orchestrator.study.ways.driven import DrivenTrial
+from vibroimpact.orchestrator.study.ways.way import Way
 
 P11: dict[str, Any] = {
     "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
@@ -97,6 +99,26 @@ def test_memory_is_measured_last_and_only_if_there_is_time() -> None:
         study = studied(Scene.from_dict(P11), slow)
     assert "memory" not in slow.told
     assert all(one.memory == -1 for one in study.measured)
+
+
+def test_an_output_without_a_value_over_so_little_leaves_its_cost_in_proportion() -> None:
+    """The last impact of a component has no phase before the first: a study of `mixed_versions` ended in an error."""
+
+    class Trial:
+        closed = 0
+
+        def run(self) -> Observation:
+            raise ComponentError("body.contact[1].last_phase: expected a finite value, got nan at time 2.")
+
+        def close(self) -> None:
+            Trial.closed += 1
+
+    way = Way("coupled", "", math.nan, {}, lambda wrap, part: Trial())
+    one = Measured(way, no_errors(""), 0.25, seconds=[2.0])
+    trying._measure_more(one, 2.0, 10.0)
+    assert math.isnan(one.short)
+    assert one.cost == pytest.approx(8.0)
+    assert Trial.closed == 1
 
 
 def test_the_transient_is_passed_once() -> None:
