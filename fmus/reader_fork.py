@@ -76,17 +76,13 @@ def read_in_fork(order: Order) -> Answer | None:
     parent = os.getpid()
     answers, answer = os.pipe()
     try:
-        with warnings.catch_warnings():
-            # of Python 3.12 and of libraries: that threads are lost
-            warnings.simplefilter("ignore")
-            process = os.fork()
+        process = _forked()
     except OSError:
         os.close(answers)
         return None
     else:
         if process == 0:
             try:
-                gc.freeze()  # objects of this process end with it, not in a copy of it
                 _leave_all_files(answer)
                 read_and_end(given, parent, _ANSWER)
             finally:
@@ -105,6 +101,23 @@ def read_in_fork(order: Order) -> Answer | None:
     waited = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM
     ended = how_it_ended(status)
     return None if waited or watch.is_stuck else Answer(ended["verdict"], error=ended["error"])
+
+
+def _forked() -> int:
+    """Fork; objects of this process end with it, not in its copy: a collection may come while the copy begins."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        with warnings.catch_warnings():
+            # of Python 3.12 and of libraries: that threads are lost
+            warnings.simplefilter("ignore")
+            process = os.fork()
+        if process == 0:
+            gc.freeze()
+        return process
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _end(process: int) -> int:
