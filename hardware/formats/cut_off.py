@@ -41,6 +41,9 @@ def without_cut_cells(
     if not kept or content.endswith(("\n", "\r")) or not content.endswith(kept[-1]):
         return kept, []
     cells = _filled(split_line(kept[-1], delimiter))
+    if not cells:  # a row whose values are missing, or a quotation mark that opens its first one
+        begun = '"' in kept[-1]
+        return kept[:-1] if begun else kept, [_left_out(kept[-1])] if begun else []
     above = [split_line(row, delimiter) for row in kept[-1 - _ROWS_COMPARED : -1]]
     before = _filled(above[-1]) if above else cells
     column = [row[len(cells) - 1] for row in above if len(row) >= len(cells)]
@@ -58,15 +61,17 @@ def without_cut_cells(
         return kept, remarks
     whole = cells if alike else cells[:-1]
     if not any(whole):
-        return kept[:-1], [
-            f"the text ends within a row: what is left of it, {_quote(cells[-1])}, is left out"
-        ]
+        return kept[:-1], [_left_out(cells[-1])]
     lost = [_LOST if cell else "" for cell in before[len(whole) :]] or [_LOST]
     if decimal == delimiter:  # quotes tell them apart
         whole = [f'"{cell}"' for cell in whole]
     kept[-1] = (" " if delimiter is None else delimiter).join([*whole, *lost])
     what = "its last columns count" if alike else f"its last value, {_quote(cells[-1])}, counts"
     return kept, [f"the text ends within a row: {what} as missing"]
+
+
+def _left_out(text: str) -> str:
+    return f"the text ends within a row: what is left of it, {_quote(text)}, is left out"
 
 
 def _filled(cells: list[str]) -> list[str]:

@@ -132,7 +132,8 @@ def _segments(lines: Sequence[str], start: int, separator: str, decimal: str) ->
         while end < len(lines) and _is_row(lines[end], separator, decimal):
             end += 1
         if end == place:
-            raise DatasetError(f"line {place + 1}: expected a row of numbers, got {lines[place][:40]!r}.")
+            got = repr(lines[place][:40]) if place < len(lines) else "the end of the file"
+            raise DatasetError(f"line {place + 1}: expected a row of numbers, got {got}.")
         if end > first:
             found.append(_Segment(header, headings, lines[first:end]))
         if len(found) > _MOST_SEGMENTS:

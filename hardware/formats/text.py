@@ -359,7 +359,7 @@ def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[
 
     Marks of comments are taken off. The delimiter is that of the rows; headings may use another.
     """
-    lines = [text for line in header if (text := _uncommented(line))][-8:]
+    lines = [line for line in header if _uncommented(line)][-8:]
     found = [cells for cells in (_heading_cells(line, width, delimiter) for line in lines) if cells]
     units = [""] * width
     if found and _are_units(found[-1]):
@@ -401,13 +401,15 @@ def _uncommented(line: str) -> str:
 
 def _heading_cells(line: str, width: int, delimiter: str | None) -> list[str]:
     """Return the cells of a heading of this width, at any delimiter that gives it."""
+    ends = delimiter is not None and line.rstrip("\r\n").endswith(delimiter)
     for mark in (delimiter, "\t", ",", ";", None):
-        cells = [cell.strip().strip(",;").strip() for cell in split_line(line, mark)]
+        cells = [cell.strip().strip(",;").strip() for cell in split_line(_uncommented(line), mark)]
         for form in (cells, [cell for cell in cells if cell]):
             if len(form) == width and any(form):
                 return form
             # a row may end in a delimiter, or its last heading be left out
-            if 2 <= len(form) == width - 1 and mark == delimiter and mark is not None and any(form):
+            is_short = len(form) == width - 1 and (ends or len(form) >= 2)
+            if is_short and mark == delimiter and mark is not None and any(form):
                 return [*form, ""]
     return []
 

@@ -99,7 +99,8 @@ def _samples_of(content: bytes) -> _Samples:
 def _column(samples: Any, label: str, interval: float, data: _Samples) -> Column:
     """Return one channel; integers as parts of full scale, with the ends of their range."""
     if samples.dtype.kind == "f":
-        return column_of(label, samples.astype(np.float64), interval=interval)
+        with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN
+            return column_of(label, samples.astype(np.float64), interval=interval)
     limits = np.iinfo(samples.dtype)
     scale, middle = -float(limits.min), 0.0
     if samples.dtype.kind == "u":

@@ -52,12 +52,13 @@ class _Structure:
         if major == 2:
             self._by_reference = {str(place): v for place, v in enumerate(variables, 1)}
         else:
-            self._by_reference = {str(int(v.reference)): v for v in variables}
+            numbered = ((_plain_number(v.reference), v) for v in variables)
+            self._by_reference = {number: v for number, v in numbered if number is not None}
 
     def _named(self, reference: str) -> Variable | None:
         """Return the variable of a reference: its place in FMI 2.0, its value reference in FMI 3.0."""
-        text = reference.strip()
-        return self._by_reference.get(str(int(text))) if text.isdecimal() and len(text) <= 20 else None
+        number = _plain_number(reference)
+        return None if number is None else self._by_reference.get(number)
 
     def amend_derivatives(self) -> None:
         """Leave out derivatives of variables that are not there."""
@@ -136,3 +137,10 @@ def _is_unknown(variable: Variable) -> bool:
 def _without(names: Iterable[str], others: Iterable[str]) -> list[str]:
     left_out = set(others)
     return [name for name in dict.fromkeys(names) if name not in left_out]
+
+
+def _plain_number(text: str) -> str | None:
+    """Return a reference without blanks and leading zeros; None of what is none, or longer than any."""
+    digits = text.strip()
+    number = digits.lstrip("0") or digits[:1]
+    return number if digits.isdecimal() and len(number) <= 20 else None

@@ -291,3 +291,10 @@ def seconds_to_read(name: str) -> float:
 def test_names_of_any_kind_are_judged_as_fast_as_plain_ones() -> None:
     # FMPy's grammar takes a hundredth of a second for a name: 4 s for these, where all else takes a tenth
     assert seconds_to_read("Thruster {}.'any state'") < 5.0 * seconds_to_read("thruster_{}")
+
+
+def test_a_reference_of_five_thousand_digits_is_refused_in_a_line() -> None:
+    """Python converts no text of so many digits; zeros before a number are allowed by FMI's schema."""
+    with pytest.raises(ComponentFileError, match="4300 digits") as refused:
+        gain3(('valueReference="3"', f'valueReference="{"0" * 5000}3"'))
+    assert len(str(refused.value)) < 1000

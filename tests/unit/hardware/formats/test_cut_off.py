@@ -11,6 +11,7 @@ from nptdms import ChannelObject, TdmsWriter
 from vibroimpact.analysis.recording import Quality, Recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.choosing import read_raw
+from vibroimpact.hardware.formats.cut_off import without_cut_cells
 from vibroimpact.hardware.recordings import import_recording, sources
 
 
@@ -161,3 +162,18 @@ def test_a_refusal_of_a_binary_file_that_was_cut_off_says_so(tmp_path: Path) -> 
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.raises(DatasetError, match=r"Give rate .*Besides, the file is cut off"):
         import_recording([path])
+
+
+@pytest.mark.parametrize(
+    ("last", "left", "remarks"),
+    [
+        ('"', 2, ["the text ends within a row: what is left of it, '\"', is left out"]),
+        ("||", 3, []),
+    ],
+)
+def test_a_last_row_without_a_cell_is_an_open_quotation_mark_or_missing_values(
+    last: str, left: int, remarks: list[str]
+) -> None:
+    rows = ['"1,5"|"2"|"3"', '"1,6"|"4"|"5"', last]
+    kept, said = without_cut_cells(rows, "\n".join(rows), "|", ",")
+    assert (len(kept), said) == (left, remarks)

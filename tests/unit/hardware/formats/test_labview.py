@@ -168,6 +168,12 @@ def test_fewer_samples_than_the_header_says_are_told(tmp_path: Path) -> None:
         (file_header(), "The measurement holds no data"),
         (file_header() + segment([], "X_Value\tbase\tboard\tComment"), "The measurement holds no data"),
         (file_header() + segment(two_channels(9), "X_Value\tbase\tboard\tComment") + "end of\tstory\n", ""),
+        (
+            file_header()
+            + segment(two_channels(9), "X_Value\tbase\tboard\tComment")
+            + "***End_of_Header***\n",
+            "expected a row of numbers, got the end of the file",
+        ),
     ],
 )
 def test_a_header_without_its_data_is_refused(tmp_path: Path, text: str, said: str) -> None:

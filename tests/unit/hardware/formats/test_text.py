@@ -360,3 +360,20 @@ def test_days_beside_clocks_give_them_their_dates_where_rows_differ_in_width() -
     assert not len(days.values)
     np.testing.assert_array_equal(clock.values, [0.0, 2.0, 4.0])
     np.testing.assert_array_equal(values.values, [1, 2, 3])
+
+
+@pytest.mark.parametrize("mark", ["\t", ";", ","])
+@pytest.mark.parametrize("bom", ["", "\ufeff"])
+def test_one_column_whose_lines_end_in_a_delimiter_keeps_its_unit(
+    tmp_path: Path, mark: str, bom: str
+) -> None:
+    """Behind a tab the heading was taken for two: the unit of the only channel was lost."""
+    path = tmp_path / "record.txt"
+    rows = "".join(f"{value}{mark}\n" for value in (2.5, -1.25, 0.6, 0.8, 0.9))
+    path.write_text(f"{bom}base (m/s^2){mark}\n{rows}", encoding="utf-8")
+    channels = import_recording([path], ImportSettings(rate=2.0, decimal=".")).channels
+    assert {name: channel.unit for name, channel in channels.items()} == {"base": "m s-2"}
+
+
+def test_a_title_above_two_columns_is_no_heading_of_one() -> None:
+    assert headings(["My title"], 2, "\t") == (["My", "title"], ["", ""])

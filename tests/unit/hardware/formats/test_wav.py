@@ -53,6 +53,13 @@ def test_24_bits_of_two_channels_are_read_to_the_last_bit(tmp_path: Path) -> Non
     assert recording.attrs["source_format"] == "WAV, 24 bit"
 
 
+def test_a_signalling_nan_is_a_missing_value_without_a_warning(tmp_path: Path) -> None:
+    samples = np.float32(SIGNAL)
+    samples.view(np.uint32)[5] = 0x7F800001
+    values = import_recording([by_scipy(tmp_path, samples)]).channels["channel_1"].values
+    assert np.flatnonzero(np.isnan(values)).tolist() == [5]
+
+
 def test_floats_keep_their_values(tmp_path: Path) -> None:
     recording = import_recording([by_scipy(tmp_path, np.float32(SIGNAL * 20.0))])
     np.testing.assert_array_equal(recording.channels["channel_1"].values, np.float32(SIGNAL * 20.0))
