@@ -6,9 +6,9 @@ import re
 from typing import Any
 
 CLASS = "commands"
-"""Of blocks that hold commands or sentences alone; `static/site.css` wraps them."""
+"""Class of blocks that hold commands or sentences alone. `static/site.css` wraps them."""
 PRINTED = "printed"
-"""Of all other blocks without a language, such as tables; `static/site.css` writes them small."""
+"""Class of all other blocks without a language, such as tables. `static/site.css` writes them small."""
 _NO_LANGUAGE = ("", "none", "default", "text")
 # Two blanks within a line, or a ruled line, stand between columns; an indented line hangs below another.
 _COLUMN = re.compile(r"\S {2,}\S|[─│]|^\s")

@@ -26,7 +26,7 @@ MOST_BYTES = 4 * 2**30
 MOST_AGE = 30 * 86400.0
 """Time since a process began to use an FMU, s, above which its unpacked copy goes; it is unpacked again when needed."""
 UNPACKING = ".unpacking-"
-"""How the names of folders begin that are being filled, or removed."""
+"""First letters of the names of folders that are being filled or removed."""
 SIZES = "sizes"
 """File of the cache: a line `folder bytes` for each folder whose files were counted, so that each is counted once."""
 _ENTRY = re.compile(r"[0-9a-f]{64}")
