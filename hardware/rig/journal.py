@@ -1,8 +1,9 @@
 """Journals: what a program measures, appended to a file as it comes, so that no death of the program loses it.
 
-A journal is a line that says what it is, a line of JSON, and records. A record is a head (kind, bytes of its content,
-number of its first sample, checksum) and its content: samples as doubles, channel by channel, or JSON. Numbers are
-little-endian. It can be cut anywhere: each whole record before the cut is read again.
+A journal is a line that says what it is, and records. A record is a head (kind, bytes of its content, number of its
+first sample, checksum) and its content: samples as doubles, channel by channel, or JSON. Numbers are little-endian. The
+header of the journal comes first, in two equal records. It can be cut anywhere: each whole record before the cut is
+read again. Version 1 had its header as a line of JSON without a checksum; it is still read.
 
 Whoever made a journal may have meant harm. So the bytes that are looked at for damaged records, the notes and the
 pieces of samples are limited; whole records of samples are not.
@@ -33,7 +34,8 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.rig.acquisition import Block
 
 _KIND = b"vibroimpact journal "
-TITLE = _KIND + b"1\n"
+TITLE = _KIND + b"2\n"
+_TITLE_OF_LINE = _KIND + b"1\n"
 ENDING = ".journal"
 MARGIN = 64 * 2**20
 """Bytes that a disk must have left."""
@@ -43,7 +45,7 @@ SLOW_DISK = 1.0
 AS_RECORDING = 1.2
 """Size of a recording, relative to that of its journal, at most."""
 _HEAD = struct.Struct("<4sIQI")
-_SAMPLES, _NOTE = b"SAMP", b"NOTE"
+_HEADER, _SAMPLES, _NOTE = b"HEAD", b"SAMP", b"NOTE"
 _LONGEST_HEADER = 2**20
 LAST_SAMPLE = 2**52
 """Largest number of a sample: its instant is still told from that of the next one."""
@@ -52,6 +54,8 @@ _MOST_LOOKED = 2**31
 
 A journal in which every record of the longest recording (0.8 GB) is damaged needs less; 2 GiB take 3 s of processor.
 """
+_MOST_LOOKED_FOR_HEADER = 2**25
+"""Bytes of damaged records that are looked at before the header is found."""
 _COST_OF_TRIAL = 4096
 """Bytes that the look at a head counts for, whatever it promises: 2 us."""
 _STRETCH = 2**24
@@ -100,7 +104,7 @@ class Journal:
         self._file = path.open("xb", buffering=0)
         try_lock(self._file.fileno())
         self._synced = time.monotonic()
-        self._write(TITLE + json.dumps(dict(header), allow_nan=False).encode() + b"\n")
+        self._write(TITLE + 2 * _record(_HEADER, 0, json.dumps(dict(header), allow_nan=False).encode()))
         self.sync()
 
     def __enter__(self) -> Journal:
@@ -119,16 +123,15 @@ class Journal:
         """Append samples."""
         volts = np.ascontiguousarray(block.volts, dtype="<f8")
         self._has_samples = True
-        self._record(_SAMPLES, block.first, volts.tobytes())
+        self._append(_record(_SAMPLES, block.first, volts.tobytes()))
 
     def note(self, **values: Any) -> None:
         """Append JSON values: a gap, the end, what else is to be known."""
-        self._record(_NOTE, 0, json.dumps(values, allow_nan=False).encode())
+        self._append(_record(_NOTE, 0, json.dumps(values, allow_nan=False).encode()))
 
-    def _record(self, kind: bytes, first: int, content: bytes) -> None:
+    def _append(self, record: bytes) -> None:
         began = time.monotonic()
-        head = _HEAD.pack(kind, len(content), first, 0)[:-4]
-        self._write(head + zlib.crc32(content, zlib.crc32(head)).to_bytes(4, "little") + content)
+        self._write(record)
         if time.monotonic() - self._synced >= SYNC_SECONDS:
             self.sync()
         self.slowest = max(self.slowest, time.monotonic() - began)
@@ -148,6 +151,11 @@ class Journal:
         """Whether the disk has hardly room for the recording that is to be made of the journal."""
         free = shutil.disk_usage(self.path.parent).free
         return free < AS_RECORDING * self.written + MARGIN / 4
+
+
+def _record(kind: bytes, first: int, content: bytes) -> bytes:
+    head = _HEAD.pack(kind, len(content), first, 0)[:-4]
+    return head + zlib.crc32(content, zlib.crc32(head)).to_bytes(4, "little") + content
 
 
 def refuse_journal(path: Path) -> None:
@@ -214,23 +222,23 @@ def read_journal(path: Path, channels_in: str = "inputs", *, ended: bool = True)
     Raises
     ------
     DatasetError
-        It is no journal, its first lines are damaged, or it has more notes or pieces than any measurement.
+        It is no journal, its header is damaged, or it has more notes or pieces than any measurement.
     UsageError
         It cannot be opened, or is still being written.
     """
     content: Any = _mapped(path, ended)
-    header, place = _header(content, path)
+    header, header_bytes, place = _header(content, path)
     channels = header.get(channels_in)
     if not isinstance(channels, list) or not channels:
         raise DatasetError(f"{path}: {channels_in}: expected a list in the header of the journal, got none.")
-    blocks, notes, whole = _Pieces(path), _Notes(path), 0
-    for kind, first, begin, end in _records(content, place):
+    blocks, notes, whole = _Pieces(path), _Notes(path), header_bytes
+    for kind, first, begin, end in _records(content, place, (_SAMPLES, _NOTE), _MOST_LOOKED):
         if kind == _NOTE:
             kept = notes.take(content[begin:end])
         else:
             kept = blocks.take(content, first, begin, end, len(channels))
         whole += end - begin + _HEAD.size if kept else 0
-    return JournalContent(header, blocks.all, notes.all, len(content) - place - whole)
+    return JournalContent(header, blocks.all, notes.all, len(content) - whole)
 
 
 def _mapped(path: Path, ended: bool) -> mmap.mmap | bytes:
@@ -258,35 +266,55 @@ def _refuse_locked(path: Path) -> None:
             ) from None
 
 
-def _header(content: Any, path: Path) -> tuple[dict[str, Any], int]:
-    start, end = len(TITLE), -1
-    if content[: len(_KIND)] == _KIND and content[:start] != TITLE:
+def _header(content: Any, path: Path) -> tuple[dict[str, Any], int, int]:
+    """Return the header, the bytes of title and header that are whole, and where the records after them begin."""
+    title = content[: len(TITLE)]
+    if title == TITLE:
+        begin, end, place = _checked_header(content)
+    elif title == _TITLE_OF_LINE:
+        begin, end = len(title), content.find(b"\n", len(title), len(title) + _LONGEST_HEADER)
+        place = end + 1
+    elif title[: len(_KIND)] == _KIND:
         version = content[len(_KIND) : len(_KIND) + 20].split(b"\n")[0].decode("ascii", "backslashreplace")
         raise DatasetError(
-            f"{path}: expected a journal of version 1, got version {version}. "
+            f"{path}: expected a journal of version 1 or 2, got version {version}. "
             "Recover it with the vibroimpact that wrote it, or a newer one."
         )
-    if content[:start] == TITLE:
-        end = content.find(b"\n", start, start + _LONGEST_HEADER)
+    else:
+        begin, end, place = 0, 0, 0
     try:
-        header = json.loads(content[start:end]) if end > 0 else None
+        header = json.loads(content[begin:end]) if end > begin else None
     except (ValueError, RecursionError):
         header = None
     if not isinstance(header, dict):
         raise DatasetError(
             f"{path}: expected a journal of `vibroimpact rig`, got another file or a damaged one."
         )
-    return header, end + 1
+    return header, len(title) + place - begin + (_HEAD.size if title == TITLE else 0), place
 
 
-def _records(content: Any, place: int) -> Iterator[tuple[bytes, int, int, int]]:
-    """Yield kind, first sample, begin and end of the content of each whole record."""
-    heads, left, given_back = _Heads(content), _MOST_LOOKED, 0
+def _checked_header(content: Any) -> tuple[int, int, int]:
+    """Return begin and end of the first whole copy of the header, and the end of the last one that follows it."""
+    start = content[: len(TITLE) + 2 * (_HEAD.size + _LONGEST_HEADER)]
+    for _, _, begin, end in _records(start, len(TITLE), (_HEADER,), _MOST_LOOKED_FOR_HEADER):
+        copy = start[begin - _HEAD.size : end]
+        return begin, end, end + len(copy) if start[end : end + len(copy)] == copy else end
+    return 0, 0, 0
+
+
+def _records(
+    content: Any, place: int, kinds: tuple[bytes, ...], left: int
+) -> Iterator[tuple[bytes, int, int, int]]:
+    """Yield kind, first sample, begin and end of the content of each whole record of some kinds.
+
+    Of damaged ones `left` bytes are looked at.
+    """
+    heads, given_back = _Heads(content, kinds), 0
     while left > 0 and place + _HEAD.size <= len(content):
         kind, length, first, checksum = _HEAD.unpack_from(content, place)
         begin = place + _HEAD.size
         end = begin + length
-        known = kind in (_SAMPLES, _NOTE) and end <= len(content)
+        known = kind in kinds and end <= len(content)
         if known and _checksum(content, place, begin, end) == checksum:
             yield kind, first, begin, end
             place = end
@@ -312,8 +340,8 @@ def _checksum(content: Any, place: int, begin: int, end: int) -> int:
 
 
 def _give_back(content: Any, start: int, stop: int) -> None:
-    """Let the system have the pages of bytes that were read; they come back where they are needed."""
-    if hasattr(mmap, "MADV_DONTNEED"):
+    """Let the system have the pages of a file that were read; they come back where they are needed."""
+    if isinstance(content, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
         page = start - start % mmap.PAGESIZE
         content.madvise(mmap.MADV_DONTNEED, page, min(stop, len(content)) - page)
 
@@ -321,9 +349,9 @@ def _give_back(content: Any, start: int, stop: int) -> None:
 class _Heads:
     """Finds the places at which a record may begin; each stretch of the file is searched once for each kind."""
 
-    def __init__(self, content: Any) -> None:
+    def __init__(self, content: Any, kinds: tuple[bytes, ...]) -> None:
         self._content = content
-        self._following = dict.fromkeys((_SAMPLES, _NOTE), -1)
+        self._following = dict.fromkeys(kinds, -1)
 
     def after(self, place: int, most: int) -> int:
         """Return the next such place after `place`, or `most`, or the end of the file."""

@@ -130,13 +130,15 @@ MANIFEST: Mapping[str, Made] = {
     "quotes": run('"'),
 }
 
-HEADER = TITLE + b'{"inputs": ["a"]}\n'
+TITLE_1 = b"vibroimpact journal 1\n"
 
 
 def _record(kind: bytes, first: int, content: bytes, length: int | None = None) -> bytes:
     head = struct.pack("<4sIQ", kind, len(content) if length is None else length, first)
     return head + struct.pack("<I", zlib.crc32(content, zlib.crc32(head))) + content
 
+
+HEADER = TITLE + _record(b"HEAD", 0, b'{"inputs": ["a"]}')
 
 JOURNAL: Mapping[str, Callable[[int], bytes]] = {
     "blocks": lambda n: HEADER + b"".join(_record(b"SAMP", at, bytes(8)) for at in range(n)),
@@ -149,11 +151,17 @@ JOURNAL: Mapping[str, Callable[[int], bytes]] = {
         HEADER + b"".join(struct.pack("<4sIQI", b"SAMP", 20 * (n - at - 1), 0, 0) for at in range(n))
     ),
     "noise": lambda n: HEADER + b"x" * n,
-    "letters of the header": lambda n: TITLE + b'{"inputs": ["' + b"x" * n + b'"]}\n',
+    "letters of the header": lambda n: TITLE + _record(b"HEAD", 0, b'{"inputs": ["' + b"x" * n + b'"]}'),
+    "letters of the header of version 1": lambda n: TITLE_1 + b'{"inputs": ["' + b"x" * n + b'"]}\n',
+    "headers": lambda n: TITLE + struct.pack("<4sIQI", b"HEAD", 20, 0, 0) * n,
+    "headers of all that follows": lambda n: TITLE + struct.pack("<4sIQI", b"HEAD", 10 * n, 0, 0) * n,
     "channels": lambda n: (
-        TITLE + json.dumps({"inputs": ["a"] * n}).encode() + b"\n" + _record(b"SAMP", 0, bytes(8 * n))
+        TITLE
+        + _record(b"HEAD", 0, json.dumps({"inputs": ["a"] * n}).encode())
+        + _record(b"SAMP", 0, bytes(8 * n))
     ),
-    "nested lists": lambda n: TITLE + b"[" * n + b"\n",
+    "nested lists": lambda n: TITLE + _record(b"HEAD", 0, b"[" * n),
+    "nested lists of version 1": lambda n: TITLE_1 + b"[" * n + b"\n",
     "nested lists of a note": lambda n: HEADER + _record(b"NOTE", 0, b"[" * n),
 }
 

@@ -69,6 +69,7 @@ HARM: dict[str, Callable[[int], bytes]] = {
     "random bytes": lambda size: np.random.default_rng(1).bytes(size),
     "one endless line": lambda size: b"[" * size,
     "zeros": bytes,
+    "headers that promise the rest": lambda size: head(b"HEAD", size) * (size // 20),
     "a note that is nested": lambda size: record(b"NOTE", b"[" * min(size, 2**20)),
     "a note of many lists": lambda size: record(b"NOTE", b'{"a": [' + b"[]," * 20_000 + b"1]}"),
     "a note that is no JSON": lambda size: record(b"NOTE", b"{"),
@@ -122,10 +123,20 @@ def test_the_bytes_that_are_looked_at_are_bounded_not_the_places(
 
 
 @pytest.mark.parametrize(
+    ("begin", "made"),
+    [
+        (b"vibroimpact journal 1\n", lambda header: header + b"\n"),
+        (TITLE, lambda header: record(b"HEAD", header)),
+    ],
+    ids=["a line", "a record"],
+)
+@pytest.mark.parametrize(
     "header", [b"[" * 1_000_000, b'{"inputs":' * 100_000, b"a" * 30_000_000, b'{"inputs": NaN}'], ids=len
 )
-def test_a_header_that_is_made_to_harm_is_one_error(tmp_path: Path, header: bytes) -> None:
-    (tmp_path / "a.journal").write_bytes(TITLE + header + b"\n")
+def test_a_header_that_is_made_to_harm_is_one_error(
+    tmp_path: Path, begin: bytes, made: Callable[[bytes], bytes], header: bytes
+) -> None:
+    (tmp_path / "a.journal").write_bytes(begin + made(header))
     done = in_this_process("rig", "recover", tmp_path / "a.journal")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
@@ -226,7 +237,7 @@ def test_gigabytes_end_within_ten_seconds_and_half_a_gigabyte(
     if has_samples:
         begun(path)
     else:
-        path.write_bytes(TITLE + json.dumps(HEADER).encode() + b"\n")
+        path.write_bytes(TITLE + record(b"HEAD", json.dumps(HEADER).encode()))
     with path.open("ab") as file:
         file.write(GIGABYTES[harm](size - 2_000_000))
         file.truncate(size)

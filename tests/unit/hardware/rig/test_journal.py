@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,12 @@ def written(path: Path, blocks: list[Block], notes: dict[int, Any] | None = None
             journal.append(block)
             ends.append(journal.written)
     return ends
+
+
+def end_of_header(content: bytes | bytearray) -> int:
+    """Return where the second copy of the header ends."""
+    text = json.dumps(HEADER).encode()
+    return content.rindex(text) + len(text)
 
 
 def blocks_of(counts: list[int], skip: int = 0) -> list[Block]:
@@ -66,7 +73,7 @@ def test_a_journal_that_is_cut_at_any_byte_gives_each_whole_record(
     blocks = blocks_of(counts)
     ends = written(path, blocks)
     whole = path.read_bytes()
-    start = whole.index(b"\n", len(journals.TITLE)) + 1
+    start = end_of_header(whole)
     cut = start + round(part * (len(whole) - start))
     path.write_bytes(whole[:cut] + garbage)  # what a file system left behind the cut
     assert same(read_journal(path), [block for block, end in zip(blocks, ends, strict=True) if end <= cut])
@@ -81,7 +88,7 @@ def test_a_flipped_bit_costs_one_record(
     blocks = blocks_of([20, 30, 40, 50])
     ends = written(path, blocks)
     content = bytearray(path.read_bytes())
-    start = content.index(b"\n", len(journals.TITLE)) + 1
+    start = end_of_header(content)
     hit = start + round(place * (len(content) - start - 1))
     content[hit] ^= 1 << bit
     path.write_bytes(content)
@@ -106,6 +113,14 @@ def test_a_flipped_bit_costs_one_record(
         b"vibroimpact journal 1\n[]\n",
         b"vibroimpact journal 1\n{}\n",
         b'vibroimpact journal 1\n{"inputs": 3}\n',
+        b"vibroimpact journal 2\n",
+        b"vibroimpact journal 2\nHEAD",
+        b"vibroimpact journal 2\n" + b"HEAD" * 1000,
+        b'vibroimpact journal 2\n{"inputs": ["tip", "loop"]}\n',
+        b"vibroimpact journal 2\n" + journals._record(b"HEAD", 0, b"[]"),
+        b"vibroimpact journal 2\n" + journals._record(b"HEAD", 0, b"[" * 100_000),
+        b"vibroimpact journal 2\n" + journals._record(b"HEAD", 0, b'{"inputs": 3}'),
+        b"vibroimpact journal 2\n" + journals._record(b"SAMP", 0, bytes(16)),
         b"CDF\x01 and so on\n{}\n",
     ],
 )
@@ -118,8 +133,42 @@ def test_another_file_is_no_journal(tmp_path: Path, content: bytes) -> None:
 
 def test_a_journal_of_a_version_to_come_is_said_to_be_one(tmp_path: Path) -> None:
     path = tmp_path / "new.journal"
-    path.write_bytes(b"vibroimpact journal 2\n{}\n")
-    with pytest.raises(DatasetError, match=r"new.journal: expected a journal of version 1, got version 2\."):
+    path.write_bytes(b"vibroimpact journal 3\n{}\n")
+    with pytest.raises(DatasetError, match=r"expected a journal of version 1 or 2, got version 3\."):
+        read_journal(path)
+
+
+def test_a_journal_of_version_1_is_read(tmp_path: Path) -> None:
+    path, blocks = tmp_path / "old.journal", blocks_of([50, 7], skip=3)
+    written(path, blocks, {1: {"gap": {"first": 50}}})
+    content = path.read_bytes()
+    line = b"vibroimpact journal 1\n" + json.dumps(HEADER).encode() + b"\n"
+    path.write_bytes(line + content[end_of_header(content) :])
+    found = read_journal(path)
+    assert same(found, blocks)
+    assert (found.header, found.notes, found.lost_bytes) == (HEADER, [{"gap": {"first": 50}}], 0)
+
+
+def test_damage_of_one_copy_of_the_header_costs_nothing_but_is_told(tmp_path: Path) -> None:
+    path, blocks = tmp_path / "a.journal", blocks_of([50, 7])
+    written(path, blocks)
+    whole = path.read_bytes()
+    size = (end_of_header(whole) - len(journals.TITLE)) // 2
+    for hit in range(len(journals.TITLE), len(journals.TITLE) + 2 * size):
+        content = bytearray(whole)
+        content[hit] ^= 1
+        path.write_bytes(content)
+        found = read_journal(path)
+        assert (found.header, found.lost_bytes) == (HEADER, size)
+        assert same(found, blocks)
+
+
+def test_an_input_that_damage_drops_from_the_header_gives_no_other_samples(tmp_path: Path) -> None:
+    path, blocks = tmp_path / "a.journal", blocks_of([50, 7])
+    written(path, blocks)
+    dropped = path.read_bytes().replace(b'["tip", "loop"]', b'["tip"        ]')
+    path.write_bytes(dropped)
+    with pytest.raises(DatasetError, match=r"a\.journal: expected a journal of .* got .* a damaged one"):
         read_journal(path)
 
 
