@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import time
 from collections.abc import Mapping
 
@@ -205,11 +206,15 @@ class GeneralRunner:
             self._importer.plan_moves()
 
     def _refuse_not_finite(self) -> None:
-        """A component that answers NaN is broken: say which and when, where samples show it."""
+        """A component that answers NaN is broken: say which and when, where samples show it.
+
+        A variable whose description names NaN has it as a value, as the phase of the last impact before the first.
+        """
         if self._sampler is None:
             return
         rows = self._sampler.rows
-        bad = np.argwhere(~np.isfinite(rows))
+        has_none = [self._is_without_value_at_times(name) for name in self._general.variables]
+        bad = np.argwhere(~(np.isfinite(rows) | (np.isnan(rows) & [False, *has_none])))
         if len(bad):
             row, column = bad[0]
             name = self._general.variables[column - 1]
@@ -218,6 +223,11 @@ class GeneralRunner:
                 instance=component_variable(name)[0],
                 time=float(rows[row, 0]),
             )
+
+    def _is_without_value_at_times(self, reference: str) -> bool:
+        component, name = component_variable(reference)
+        variable = self._importer.components[component].variables[name]
+        return "nan" in re.findall(r"\w+", (variable.description or "").lower())
 
     # ---- what happens during a run ----
 

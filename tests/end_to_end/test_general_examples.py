@@ -80,6 +80,19 @@ def test_a_body_and_a_stop_of_two_fmi_versions_keep_the_period_one_orbit(tmp_pat
     comes_back(tmp_path, "mixed_versions")
 
 
+def test_a_phase_of_the_last_impact_has_no_value_before_the_first(tmp_path: Path) -> None:
+    text = (EXAMPLES / "mixed_versions.toml").read_text()
+    from_rest = text.replace("transient_time = 1256.6370614359173", "transient_time = 0")
+    assert from_rest != text
+    (tmp_path / "from_rest.toml").write_text(from_rest)
+    assert in_this_process("run", tmp_path / "from_rest.toml", "-o", tmp_path / "run.nc").returncode == 0
+    dataset = read_flat(tmp_path / "run.nc")
+    phase, first = dataset.body_contact_1_last_phase.values.ravel(), dataset.event_time.values.min()
+    before = dataset.time.values < first
+    assert before.sum() > 50
+    assert np.array_equal(np.isnan(phase), before)
+
+
 def test_the_instruments_of_a_rig_say_what_their_equations_say(tmp_path: Path) -> None:
     dataset = read_flat(ran(tmp_path, "measuring_chain"))
     assert dataset.outcome.values[0] == Outcome.ok
