@@ -26,6 +26,10 @@ from vibroimpact.hardware.formats.wav import read_wav
 
 _NETCDF3 = (b"CDF\x01", b"CDF\x02")
 _NETCDF_64_BIT = b"CDF\x05"
+_WORDS_OF_NETCDF = (b"_NCProperties", b"DIMENSION_SCALE", b"vibroimpact SHA-256")
+"""An HDF5 file that a NetCDF library or this program wrote has one of them; HDF5 writes attributes as they are."""
+_LONGEST_WORD = max(map(len, _WORDS_OF_NETCDF))
+_STRETCH = 1 << 22
 _OTHERS = {
     b"PK": "a zip archive or a spreadsheet (.xlsx, .ods)",
     b"\xd0\xcf\x11\xe0": "an old spreadsheet (.xls)",
@@ -77,6 +81,8 @@ def holds_recording(path: Path) -> bool:
     with path.open("rb") as file:
         if file.read(len(HDF5)) != HDF5:
             return False
+    if is_h5py_there() and not _has_word_of_netcdf(path):
+        return False
     try:
         check_reads(path)
     except UnreadableError as problem:
@@ -84,6 +90,18 @@ def holds_recording(path: Path) -> bool:
             return False  # HDF5 that is no NetCDF
         raise
     return is_recording(path)
+
+
+def _has_word_of_netcdf(path: Path) -> bool:
+    """Whether an HDF5 file may be one of NetCDF: another one is never shown to the library of that."""
+    with path.open("rb") as file:
+        before = b""
+        while stretch := file.read(_STRETCH):
+            stretch = before + stretch
+            if any(word in stretch for word in _WORDS_OF_NETCDF):
+                return True
+            before = stretch[-_LONGEST_WORD:]
+    return False
 
 
 def read_raw(path: Path, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
@@ -102,7 +120,7 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "", dates: s
         return read_hdf5(path, matlab=True)
     if start.startswith(b"MATLAB 5.0") or (path.suffix.lower() == ".mat" and not start.startswith(HDF5)):
         return read_mat(path)
-    if start.startswith(HDF5) and is_h5py_there() and not is_netcdf4(path):
+    if start.startswith(HDF5) and is_h5py_there() and not (_has_word_of_netcdf(path) and is_netcdf4(path)):
         return read_hdf5(path)
     if start.startswith(_NETCDF_64_BIT):
         raise DatasetError(

@@ -43,7 +43,7 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
     import h5py
 
     with one_refusal("a whole HDF5 file"), h5py.File(path, "r") as file:
-        return "_NCProperties" in file.attrs or any(
+        return bool(_text(file.attrs.get("_NCProperties"))) or any(
             _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [], Scope())
         )
 

@@ -190,7 +190,7 @@ def test_a_file_that_kills_its_reader_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "record.nc"
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"\x00" * 200)
     with pytest.raises(
-        DatasetError, match=r"record\.nc: expected a whole HDF5 file, got one that cannot be read"
+        DatasetError, match=r"record\.nc: expected an HDF5 file that is whole, got one that cannot be read"
     ):
         import_recording([path])
 

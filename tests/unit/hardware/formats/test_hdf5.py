@@ -11,6 +11,7 @@ import pytest
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats import choosing
 from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.recordings import ImportSettings, import_recording, sources
 
@@ -160,6 +161,37 @@ def test_attributes_of_unusual_kinds_and_circles_of_groups_do_no_harm(tmp_path: 
     assert list(recording.channels) == ["run_acc"]
     assert recording.scalars["whole"].value == 2.0
     assert "nothing: holds no numbers and is left out" in recording.remarks
+
+
+def test_a_file_of_another_program_is_not_shown_to_the_netcdf_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That library goes through every link, also in a circle: 20 s of processor and 4 GB for 5 kB."""
+    path = tmp_path / "circle.h5"
+    with h5py.File(path, "w") as file:
+        file["time"], file["acc"] = TIME, ACC
+        file["run/back"] = h5py.SoftLink("/")
+
+    def shown(path: Path) -> None:
+        raise AssertionError(path)
+
+    monkeypatch.setattr(choosing, "check_reads", shown)
+    recording = import_recording([path])
+    np.testing.assert_array_equal(recording.channels["acc"].values, ACC)
+    assert "run.back: a link to elsewhere is left out" in recording.remarks
+
+
+def test_words_of_netcdf_are_found_wherever_a_file_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choosing, "_STRETCH", 16)
+    path = tmp_path / "words"
+    for word in (b"_NCProperties", b"DIMENSION_SCALE", b"vibroimpact SHA-256"):
+        for place in range(40):
+            path.write_bytes(bytes(place) + word + bytes(7))
+            assert choosing._has_word_of_netcdf(path)
+            path.write_bytes(bytes(place) + word[:-1] + bytes(7))
+            assert not choosing._has_word_of_netcdf(path)
 
 
 def test_the_indices_of_a_sparse_matrix_are_no_channels(tmp_path: Path) -> None:
