@@ -208,6 +208,8 @@ def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Colum
     >>> column.values, column.overrange
     (array([ 1., nan, nan, nan]), array([False,  True, False,  True]))
     """
+    if np.any(missing := np.isnan(values)):
+        values = np.where(missing, np.nan, values)  # of one kind: one that signals is a warning in every sum
     low, high = np.fmin.reduce(values, initial=0.0), np.fmax.reduce(values, initial=0.0)
     if low >= -OVERRANGE_FROM and high <= OVERRANGE_FROM:
         return Column(label, values, unit, None, **facts)

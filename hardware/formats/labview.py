@@ -286,7 +286,7 @@ def _declare(column: Column, declared: _Declared, number: int, late: float) -> C
         interval if interval is not None and interval > 0.0 else None,
         (quantity("X0") or 0.0) + late + behind,
         f"start {entry('Time')}" if behind else "",
-        attrs={} if samples is None else {"declared_samples": int(min(samples, 2**53))},
+        attrs={} if samples is None else {"declared_samples": int(min(max(samples, -(2**53)), 2**53))},
     )
 
 

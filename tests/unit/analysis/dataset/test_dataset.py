@@ -147,6 +147,12 @@ def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
     xr.testing.assert_identical(read_flat(written(dataset, tmp_path)), dataset)
 
 
+def test_a_scene_above_64_kib_is_written_and_read(tmp_path: Path) -> None:
+    """The library before its version 4.10 writes no such attribute into a file in memory."""
+    dataset = up_down().assign_attrs(scene="# a long sweep\n" * 10_000)
+    xr.testing.assert_identical(read_flat(written(dataset, tmp_path)), dataset)
+
+
 def test_what_is_written_of_a_coupled_scene_is_what_is_read(tmp_path: Path) -> None:
     dataset = coupled_dataset([coupled_record(float(k), events=k, samples=2) for k in range(4)])
     xr.testing.assert_identical(read_flat(written(dataset, tmp_path)), dataset)

@@ -213,3 +213,9 @@ def test_a_thousand_channels_cost_a_thousand_times_one(tmp_path: Path) -> None:
     assert [column.interval for column in table.columns] == [0.5] * many
     with pytest.raises(DatasetError, match="at most 1024 columns"):
         read_labview(text.replace(row, row + "\t2.5" * 100))
+
+
+@pytest.mark.parametrize("samples", ["1e999", "-1e999", "1e40", "-1e40"])
+def test_a_header_of_any_number_of_samples_is_compared_with_the_rows(tmp_path: Path, samples: str) -> None:
+    text = file_header() + segment(two_channels(20), "X_Value\tbase\tboard\tComment", Samples=samples)
+    assert len(imported(tmp_path, text).channels["base"].values) == 20

@@ -112,6 +112,17 @@ def test_a_foreign_netcdf_file_gives_its_variables_of_one_dimension(tmp_path: Pa
     assert "calibration: a group is left out; variables outside groups are read" in told
 
 
+def test_nan_that_signals_is_a_missing_value_without_a_warning(tmp_path: Path) -> None:
+    path = foreign(tmp_path / "foreign.nc")
+    with netCDF4.Dataset(path, "a") as file:
+        instants = file["time"][:].filled()
+        instants.view(np.uint64)[7] = 0x7FF0000000000001
+        file["time"][:] = instants
+    recording = import_recording([path])
+    assert "1 rows have no instant; they are counted on" in recording.remarks
+    assert recording.channels["base"].axis.interval == pytest.approx(0.5)
+
+
 def test_a_recording_is_passed_on_as_it_is_and_takes_no_options(tmp_path: Path) -> None:
     first = import_recording([foreign(tmp_path / "foreign.nc")])
     write_recording(first, tmp_path / "ours.nc")
