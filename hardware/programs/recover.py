@@ -7,10 +7,11 @@ from pathlib import Path
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.analysis.recording import Recording
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.hardware.programs.keeping import recording_in, write_and_show
 from vibroimpact.hardware.rig.journal import read_journal
+from vibroimpact.hardware.rig.measurement import FEWEST_SAMPLES
 
 
 def recover(journal: str | os.PathLike[str]) -> Recording:
@@ -25,11 +26,17 @@ def recover(journal: str | os.PathLike[str]) -> Recording:
     UsageError
         There is none, or a program is still writing it.
     DatasetError
-        It is no journal.
+        It is no journal, or has fewer than two samples.
     RigError
-        There are fewer than two samples in it.
+        No pulse was recorded.
     """
     content = read_journal(Path(journal))
+    count = sum(block.volts.shape[1] for block in content.blocks)
+    if count < FEWEST_SAMPLES:
+        raise DatasetError(
+            f"{os.fspath(journal)}: expected a journal of {FEWEST_SAMPLES} samples or more, got {count}; "
+            f"{content.lost_bytes} of its bytes are damaged or cut off."
+        )
     if content.lost_bytes:
         content.notes.append({"remark": f"{content.lost_bytes} bytes of the journal are damaged or cut off"})
     return recording_in(content, str(journal))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import struct
 import subprocess
 import sys
@@ -241,11 +240,25 @@ def test_gigabytes_end_within_ten_seconds_and_half_a_gigabyte(
     with path.open("ab") as file:
         file.write(GIGABYTES[harm](size - 2_000_000))
         file.truncate(size)
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(
-        [sys.executable, "-c", ENTRY, "rig", "recover", path], capture_output=True, text=True
+    with (tmp_path / "said").open("wb") as said:
+        child = subprocess.Popen(
+            [sys.executable, "-c", ENTRY, "rig", "recover", path], stdout=said, stderr=said
+        )
+        _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    text = (tmp_path / "said").read_text()
+    assert child.returncode == (0 if has_samples else 2), text
+    assert text.count("\n") < 20
+    assert used.ru_utime + used.ru_stime < MOST_SECONDS
+    assert used.ru_maxrss * 1024 < MOST_MEMORY
+
+
+def test_a_journal_without_samples_is_refused_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    path.write_bytes(TITLE + record(b"HEAD", json.dumps(HEADER).encode()) + b"cut")
+    done = in_this_process("rig", "recover", path)
+    assert done.returncode == 2
+    assert done.stderr == (
+        f"{path}: expected a journal of 2 samples or more, got 0; 3 of its bytes are damaged or cut off.\n"
     )
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert done.returncode == (0 if has_samples else 2), done.stderr
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < MOST_SECONDS
-    assert after.ru_maxrss * 1024 < MOST_MEMORY
+    assert not (tmp_path / "a.nc").exists()
