@@ -10,9 +10,9 @@ import json
 import logging
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from http import HTTPStatus
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any
 
 import h11
@@ -24,6 +24,10 @@ from vibroimpact.service.turns import Turns
 
 MOST_CONNECTIONS = 500
 """Open connections; one more closes the oldest of strangers, if there are some without a whole request."""
+YOUNG_SECONDS = 1.0
+"""Age, s, below which a connection is closed only beyond `MOST_YOUNG`: its request may be on the way."""
+MOST_YOUNG = 4
+"""Open connections, relative to `MOST_CONNECTIONS`, with the young ones."""
 SHARE_CLOSED = 1 / 16
 """Part of the connections that is closed at a time, so that who can be spared is not looked for at each new one."""
 MOST_HEAD = 16 * 2**10
@@ -44,8 +48,6 @@ FEWEST_CONNECTIONS = 16
 """Connections that are allowed where the system allows few open files."""
 ROOM = 32
 """Connections of strangers that are closed when the system has no more open files."""
-PASSES_UNREAD = 3
-"""Passes of the event loop after which a connection that was taken is read: many are taken in one pass."""
 SAID_SECONDS = 60.0
 """Time after which a shortage that lasts is logged again, s."""
 LOG = logging.getLogger("vibroimpact.service")
@@ -54,10 +56,14 @@ KNOWN = "vibroimpact.known"
 one who has not."""
 
 
-def most_connections() -> int:
-    """Raise this process's limit of open files as far as allowed; return how many connections fit below it."""
+def most_connections() -> tuple[int, int]:
+    """Raise this process's limit of open files as far as allowed; return how many connections fit.
+
+    The second number is that with those which have just been opened.
+    """
+    most, with_young = MOST_CONNECTIONS, MOST_YOUNG * MOST_CONNECTIONS
     if sys.platform == "win32":
-        return MOST_CONNECTIONS
+        return most, most  # `select` takes 512
     import resource
 
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -66,8 +72,9 @@ def most_connections() -> int:
         resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
         soft = allowed
     if soft == resource.RLIM_INFINITY:
-        return MOST_CONNECTIONS
-    return min(MOST_CONNECTIONS, max(soft - RESERVED, FEWEST_CONNECTIONS))
+        return most, with_young
+    room = max(soft - RESERVED, FEWEST_CONNECTIONS)
+    return min(most, room), min(with_young, room)
 
 
 class Connections:
@@ -75,8 +82,8 @@ class Connections:
 
     Parameters
     ----------
-    most : int
-        Connections that may be open at a time.
+    most, most_with_young : int
+        Connections that may be open at a time, without and with those that have just been opened.
 
     Attributes
     ----------
@@ -84,8 +91,8 @@ class Connections:
         Turns of the requests of strangers.
     """
 
-    def __init__(self, most: int = MOST_CONNECTIONS) -> None:
-        self._most = most
+    def __init__(self, most: int, most_with_young: int) -> None:
+        self._most, self._most_with_young = most, most_with_young
         self.turns = Turns()
         self._open: dict[LimitedProtocol, None] = {}
         self._sweep: asyncio.TimerHandle | None = None
@@ -99,8 +106,10 @@ class Connections:
         """Add a connection; where it is one too many, close the oldest that can be spared, else this one."""
         self._open[connection] = None
         if len(self._open) > self._most:
-            spared = list(islice(self._spared(connection), max(1, int(SHARE_CLOSED * self._most))))
-            for one in spared or [connection]:
+            spared = list(islice(self._spared(self._old()), max(1, int(SHARE_CLOSED * self._most))))
+            if not spared and len(self._open) > self._most_with_young:
+                spared = next(([one] for one in self._spared(self._others(connection))), [connection])
+            for one in spared:
                 self._close(one)
         if self._sweep is None and self._open:
             self._swept = time.monotonic()
@@ -117,20 +126,25 @@ class Connections:
         if not (isinstance(error, OSError) and error.errno in SHORT):
             loop.default_exception_handler(context)
             return
-        for connection in list(islice(self._spared(None), ROOM)):
+        for connection in list(islice(self._spared(list(self._open)), ROOM)):
             self._close(connection)
         if time.monotonic() - self._said >= SAID_SECONDS:
             self._said = time.monotonic()
             LOG.warning("no connection can be taken now", extra={"why": str(error)})
 
-    def _spared(self, new: LimitedProtocol | None) -> Iterator[LimitedProtocol]:
-        """Yield connections that can be closed, without the new one: strangers before those who have the token."""
-        others = [one for one in self._open if one is not new]
-        strangers = [one for one in others if not one.is_known]
-        yield from (one for one in strangers if not one.is_unread and not one.is_whole())
-        yield from (one for one in strangers if one.is_whole())
-        yield from (one for one in strangers if one.is_unread and not one.is_whole())
-        yield from (one for one in others if one.is_known and not one.is_whole())
+    def _old(self) -> list[LimitedProtocol]:
+        """Return those of strangers whose request had time to come; the oldest are the first of all."""
+        latest = time.monotonic() - YOUNG_SECONDS
+        return [one for one in takewhile(lambda one: one.taken <= latest, self._open) if not one.is_known]
+
+    def _others(self, new: LimitedProtocol) -> list[LimitedProtocol]:
+        return [one for one in self._open if one is not new]
+
+    def _spared(self, among: Sequence[LimitedProtocol]) -> Iterator[LimitedProtocol]:
+        """Yield connections that can be closed: strangers before those who have the token, whole requests later."""
+        yield from (one for one in among if not one.is_known and not one.is_whole())
+        yield from (one for one in among if not one.is_known and one.is_whole())
+        yield from (one for one in among if one.is_known and not one.is_whole())
 
     def _close(self, connection: LimitedProtocol) -> None:
         self.discard(connection)
@@ -186,21 +200,13 @@ class LimitedProtocol(H11Protocol):
         super().connection_made(transport)
         self.conn = _BoundedHead(h11.SERVER, MOST_HEAD)
         self.is_known = False
-        self.is_unread = True
-        self.loop.call_soon(self._let_read, PASSES_UNREAD)
+        self.taken = time.monotonic()
         self._requests = 0
         self._received = 0
         self._unsent = 0
         self._phase: tuple[str, object] = ("head", None)
         self._left = HEAD_SECONDS
         self.all_open.add(self)
-
-    def _let_read(self, passes: int) -> None:
-        """Note that what was sent with the connection is read once so many passes of the event loop are over."""
-        if passes:
-            self.loop.call_soon(self._let_read, passes - 1)
-        else:
-            self.is_unread = False
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End."""

@@ -91,7 +91,7 @@ class _Server(uvicorn.Server):
 
     def __init__(self, app: Guarded) -> None:
         logging.getLogger("uvicorn.access").disabled = True
-        self._connections = Connections(most_connections())
+        self._connections = Connections(*most_connections())
         config = uvicorn.Config(
             app,
             http=limited(self._connections),

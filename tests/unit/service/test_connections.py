@@ -25,7 +25,7 @@ from vibroimpact.service.connections import (
     limited,
 )
 
-MOST = 6
+MOST, MOST_WITH_YOUNG = 6, 20
 SILENT = b""
 HALF = b"GET / HTTP/1.1\r\nHost: a\r\nX: "
 ASKED = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
@@ -60,7 +60,7 @@ class Listening(uvicorn.Server):
     """A server with limits in a thread of this process, whose time passes as the test says."""
 
     def __init__(self) -> None:
-        self.connections = Connections(MOST)
+        self.connections = Connections(MOST, MOST_WITH_YOUNG)
         self.socket = socket.create_server(("127.0.0.1", 0))
         protocol = limited(self.connections)
         super().__init__(
@@ -104,6 +104,7 @@ class Listening(uvicorn.Server):
 @pytest.fixture
 def listening(monkeypatch: pytest.MonkeyPatch) -> Iterator[Listening]:
     monkeypatch.setattr(module, "SWEEP_SECONDS", 1e6)
+    monkeypatch.setattr(module, "YOUNG_SECONDS", 0.0)
     server = Listening()
     server.thread.start()
     while not server.started:
@@ -193,9 +194,29 @@ def test_one_who_asks_at_once_is_answered_among_any_number_who_do_not(listening:
     assert listening.open(ASKED).recv(12).endswith(b" 200")
 
 
-def test_connections_that_come_together_are_read_before_one_of_them_is_closed(listening: Listening) -> None:
+def test_one_whose_request_is_on_the_way_is_answered_among_any_number_who_come_meanwhile(
+    listening: Listening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for _ in range(MOST):
+        listening.open(HELD)
+    monkeypatch.setattr(module, "YOUNG_SECONDS", 1e6)
+    late = listening.open(SILENT)
+    for _ in range(MOST_WITH_YOUNG - MOST - 1):
+        listening.open(SILENT)
+    late.sendall(ASKED)
+    assert late.recv(12).endswith(b" 200")
+    for _ in range(3 * MOST_WITH_YOUNG):
+        listening.open(SILENT)
+    assert len(listening.connections) == MOST_WITH_YOUNG
+    assert listening.open(ASKED).recv(12).endswith(b" 200")
+
+
+def test_connections_that_come_together_are_read_before_one_of_them_is_closed(
+    listening: Listening, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for _ in range(MOST):
         listening.open(HELD)  # whole requests, which are closed last
+    monkeypatch.setattr(module, "YOUNG_SECONDS", 1e6)
     busy = threading.Event()
     listening.loop.call_soon_threadsafe(busy.wait)
     together = [socket.create_connection(listening.socket.getsockname(), 20.0) for _ in range(MOST)]
