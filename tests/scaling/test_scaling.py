@@ -28,6 +28,7 @@ QUICK = (
     "imported text: rows that ascend",
     "scene: keys",
     "FMU description: variables",
+    "FMU description: variables of unknown causality",
     "SSD: components",
     "SSV: parameters",
     "journal: blocks",

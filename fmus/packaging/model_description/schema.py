@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Generator
+from contextlib import closing
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,8 @@ _ANYWHERE = {
 }
 #: Rounds of the schema, in each of which elements may be left out; errors that are graded one by one.
 _MOST_ROUNDS, _MOST_ERRORS = 20, 1000
+#: Children of an element that the schema is shown at a time.
+_WINDOW = 500
 #: Refusals that are told, and characters of a name that is compared with the schema's or of a value that is repeated.
 _MOST_TOLD, _LONGEST = 10, 80
 _BOOLEAN = "'xs:boolean'"
@@ -113,6 +117,24 @@ def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
+def _windows(root: Any) -> Generator[None, None, None]:
+    """Leave a few children at a time to elements of many; the last of them is with the next ones, too.
+
+    The library goes through all children before the one of an error: 100,000 errors would take minutes.
+    """
+    many = {one: list(one) for one in root.iter(etree.Element) if len(one) > _WINDOW}
+    try:
+        for first in range(0, max(map(len, many.values()), default=1), _WINDOW):
+            for one, children in many.items():
+                one[:] = (
+                    children[max(first - 1, 0) : first + _WINDOW] if first < len(children) else children[:1]
+                )
+            yield
+    finally:
+        for one, children in many.items():
+            one[:] = children
+
+
 class _Amendments:
     """What is changed in a description until the schema takes it."""
 
@@ -124,22 +146,31 @@ class _Amendments:
     def make(self) -> None:
         """Amend the description; what cannot be amended is refused."""
         for _ in range(_MOST_ROUNDS):
-            # their elements are found before any is taken out: places change then
-            errors = [(error, self._element(error)) for error in self._errors()]
+            errors = self._errors()
             left = [error for error, element in errors if not self._amend(error, element)]
             if left or not errors:
                 break
         else:
-            left = self._errors()
+            left = [error for error, _ in self._errors()]
         for error in left[:_MOST_TOLD]:
             self._findings.add(Grade.refused, f"line {error.line}: {_cut_message(error.message)}")
         self._root.extend(self._moved)
 
-    def _errors(self) -> list[Any]:
+    def _errors(self) -> list[tuple[Any, Any]]:
+        """Return errors with their elements, before any of these is taken out: places change then."""
         schema = _schema(self._folder)
-        if schema.validate(self._root):
-            return []
-        return [error for error in schema.error_log if error.message not in self._accepted][:_MOST_ERRORS]
+        found: dict[tuple[Any, str, int], tuple[Any, Any]] = {}
+        with closing(_windows(self._root)) as windows:
+            for _ in windows:
+                if schema.validate(self._root):
+                    continue
+                for error in list(schema.error_log)[:_MOST_ERRORS]:
+                    if error.message not in self._accepted:
+                        element = self._element(error)
+                        found.setdefault((element, error.message, error.line), (error, element))
+                if len(found) >= _MOST_ERRORS:
+                    break
+        return list(found.values())[:_MOST_ERRORS]
 
     def _element(self, error: Any) -> Any:
         """Return the element that an error is about; None where the schema does not say it."""

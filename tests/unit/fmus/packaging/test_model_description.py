@@ -227,6 +227,38 @@ def test_variables_with_the_same_fault_share_a_line_of_bounded_length() -> None:
     assert len(only(found).text) < 600
 
 
+def many_variables(wrong: dict[int, str]) -> tuple[str, str]:
+    """Return a change that adds 1,300 variables, to some of which something is added."""
+    more = "".join(
+        f'<Float64 name="v{k}" valueReference="{k + 100}" causality="local"{wrong.get(k, "")}/>'
+        for k in range(1300)
+    )
+    return ("</ModelVariables>", f"{more}</ModelVariables>")
+
+
+@pytest.mark.parametrize("place", [0, 496, 497, 498, 499, 996, 1299])
+def test_a_fault_is_found_at_any_place_among_many_variables(place: int) -> None:
+    found = gain3(many_variables({place: ' min="word"'}))
+    assert (
+        only(found).text == "Float64: min: expected a value that FMI allows, got 'word'. It is not looked at."
+    )
+    assert [v.name for v in found.description.modelVariables[-1300:]] == [f"v{k}" for k in range(1300)]
+    with pytest.raises(ComponentFileError, match="xs:boolean"):
+        gain3(
+            many_variables(
+                {place: ' clearAtReset="word" canHandleMultipleSetPerTimeInstant="word"', 3: ' min="word"'}
+            )
+        )
+
+
+@pytest.mark.parametrize("place", [3, 499, 500, 501, 1299])
+def test_an_order_that_fmi_does_not_have_is_refused_at_any_place(place: int) -> None:
+    listed = ['<Output valueReference="3"/>'] * 1300
+    listed[place] = '<InitialUnknown valueReference="3"/><Output valueReference="3"/>'
+    with pytest.raises(ComponentFileError, match="This element is not expected"):
+        gain3(("</ModelStructure>", f"{''.join(listed)}</ModelStructure>"))
+
+
 #: Changes of a description of FMI 2.0, each of which FMPy finds something wrong with, or nothing.
 CHANGES = (
     ("<Real />", "<Real/>"),
