@@ -28,6 +28,8 @@ class Kind:
         Number of cases of `make soak` and of `make test`.
     seconds : float
         Processor time after which a case counts as hanging.
+    is_alone : bool
+        It measures wall time: its cases have the machine for themselves.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Kind:
     cases: int
     sample: int
     seconds: float
+    is_alone: bool = False
 
     def seed(self, base: int, case: int) -> int:
         """Return the seed of a case."""
@@ -63,4 +66,5 @@ def kind(name: str, package: str = "soak") -> Kind:
         int(getattr(module, "CASES", CASES)),
         int(getattr(module, "SAMPLE", SAMPLE)),
         float(getattr(module, "SECONDS", SECONDS)),
+        bool(getattr(module, "ALONE", False)),
     )

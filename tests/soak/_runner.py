@@ -34,7 +34,7 @@ def run(
     Parameters
     ----------
     kinds : sequence of Kind
-        All of one package; they advance side by side, by equal shares.
+        All of one package; they advance side by side, by equal shares, after those whose cases run alone.
     counts : dict
         Number of cases of each kind, by name.
     base : int
@@ -49,6 +49,22 @@ def run(
         Called for every case.
     """
     end = time.monotonic() + seconds
+    alone = [kind for kind in kinds if kind.is_alone]
+    beside = [kind for kind in kinds if not kind.is_alone]
+    parts = [(part, number) for part, number in ((alone, 1), (beside, processes)) if part]
+    return all([_run(part, counts, base, journal, end, number, tell) for part, number in parts])
+
+
+def _run(
+    kinds: Sequence[Kind],
+    counts: Counts,
+    base: int,
+    journal: Journal,
+    end: float,
+    processes: int | None,
+    tell: Callable[[Tried], None],
+) -> bool:
+    """Try the cases of kinds side by side until an instant; return whether they are all tried."""
     waiting = _waiting(kinds, counts, base, journal)
     wanted = sum(counts[kind.name] for kind in kinds) - len(_tried(kinds, counts, journal))
     children = [Child(kinds[0].package) for _ in range(min(processes or os.cpu_count() or 1, wanted))]

@@ -21,6 +21,7 @@ from vibroimpact.service.client import RemoteJob, ServiceError
 CASES = 20
 SAMPLE = 1
 SECONDS = 300.0
+ALONE = True
 JOBS = 3
 POINTS, TRANSIENT = 60, 20_000
 ATTACKERS = 2

@@ -129,6 +129,15 @@ def test_kinds_advance_by_equal_shares_and_the_end_of_the_time_is_said(kinds: st
     journal.close()
 
 
+def test_cases_that_measure_time_come_first_and_alone(kinds: str, tmp_path: Path) -> None:
+    journal, told = Journal(tmp_path / "journal.jsonl"), list[Tried]()
+    both = [kind("bad", kinds), replace(kind("good", kinds), is_alone=True)]
+    assert run(both, {"good": 3, "bad": 1}, 5, journal, 60.0, processes=2, tell=told.append)
+    assert [entry.kind for entry in told] == ["good"] * 3 + ["bad"]
+    journal.close()
+    assert kind("service_strangers").is_alone
+
+
 def test_few_long_cases_wait_for_no_more_than_their_share_of_many_short_ones(
     kinds: str, tmp_path: Path
 ) -> None:
