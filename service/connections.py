@@ -133,7 +133,7 @@ class Connections:
             LOG.warning("no connection can be taken now", extra={"why": str(error)})
 
     def _old(self) -> list[LimitedProtocol]:
-        """Return those of strangers whose request had time to come; the oldest are the first of all."""
+        """Return connections of strangers whose request had time to come."""
         latest = time.monotonic() - YOUNG_SECONDS
         return [one for one in takewhile(lambda one: one.taken <= latest, self._open) if not one.is_known]
 

@@ -118,21 +118,43 @@ def _cut(text: str) -> str:
 
 
 def _windows(root: Any) -> Generator[None, None, None]:
-    """Leave a few children at a time to elements of many; the last of them is with the next ones, too.
+    """Leave a few children of each name at a time to elements of many; one of them is with the next ones, too.
 
     The library goes through all children before the one of an error: 100,000 errors would take minutes.
     """
-    many = {one: list(one) for one in root.iter(etree.Element) if len(one) > _WINDOW}
+    many = [_Children(one) for one in root.iter(etree.Element) if len(one) > _WINDOW]
     try:
-        for first in range(0, max(map(len, many.values()), default=1), _WINDOW):
-            for one, children in many.items():
-                one[:] = (
-                    children[max(first - 1, 0) : first + _WINDOW] if first < len(children) else children[:1]
-                )
+        for first in range(0, max((one.most for one in many), default=1), _WINDOW):
+            for one in many:
+                one.show(first)
             yield
     finally:
-        for one, children in many.items():
-            one[:] = children
+        for one in many:
+            one.show_all()
+
+
+class _Children:
+    """The children of an element by name: those of few stay, since the schema may require them."""
+
+    def __init__(self, parent: Any) -> None:
+        self._parent, self._all = parent, list(parent)
+        places: dict[Any, list[int]] = {}
+        for place, child in enumerate(self._all):
+            places.setdefault(child.tag, []).append(place)
+        self._places = list(places.values())
+        self.most = max(map(len, self._places))
+
+    def show(self, first: int) -> None:
+        """Leave the children from a number on, in their order."""
+        shown: list[int] = []
+        for places in self._places:
+            few = len(places) <= _WINDOW
+            shown += places if few else places[max(first - 1, 0) : first + _WINDOW] or places[:1]
+        self._parent[:] = [self._all[place] for place in sorted(shown)]
+
+    def show_all(self) -> None:
+        """Put all children back."""
+        self._parent[:] = self._all
 
 
 class _Amendments:

@@ -6,13 +6,14 @@ import time
 from importlib.metadata import version
 
 import pytest
+from scaling.descriptions import all_tokens
 from support.fmpy_checks import description_problems
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.fmpy_door import Reading, read
-from vibroimpact.fmus.packaging.model_description import Finding, Grade
+from vibroimpact.fmus.packaging.model_description import Finding, Grade, schema
 
 
 def content_of(name: str, fmi: str, *changes: tuple[str, str]) -> bytes:
@@ -249,6 +250,23 @@ def test_a_fault_is_found_at_any_place_among_many_variables(place: int) -> None:
                 {place: ' clearAtReset="word" canHandleMultipleSetPerTimeInstant="word"', 3: ' min="word"'}
             )
         )
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, 36])
+def test_what_is_shown_at_a_time_changes_no_finding(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    kinds = [one for one in all_tokens() if one.parser == "FMU description"]
+    contents = {one.kind: one.content(37) for one in kinds if one.kind != "odd elements of one name"}
+    assert len(contents) > 40
+    whole = {kind: _found(content) for kind, content in contents.items()}
+    monkeypatch.setattr(schema, "_WINDOW", size)
+    assert {kind: _found(content) for kind, content in contents.items()} == whole
+
+
+def _found(content: bytes) -> object:
+    try:
+        return sorted((finding.grade.name, finding.text) for finding in read(content).findings)
+    except ComponentFileError as refusal:
+        return str(refusal)
 
 
 @pytest.mark.parametrize("place", [3, 499, 500, 501, 1299])

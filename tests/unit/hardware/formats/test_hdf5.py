@@ -166,7 +166,7 @@ def test_attributes_of_unusual_kinds_and_circles_of_groups_do_no_harm(tmp_path: 
 def test_a_file_of_another_program_is_not_shown_to_the_netcdf_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """That library goes through every link, also in a circle: 20 s of processor and 4 GB for 5 kB."""
+    """The NetCDF library follows every link, also in a circle: it took 20 s and 4 GB for 5 kB."""
     path = tmp_path / "circle.h5"
     with h5py.File(path, "w") as file:
         file["time"], file["acc"] = TIME, ACC
