@@ -82,6 +82,16 @@ def test_a_portrait_of_one_displacement_has_the_stop_and_no_legend() -> None:
     assert axis.get_lines()[-1].get_xdata() == [0.5, 0.5]
 
 
+def test_dots_of_a_portrait_join_what_is_before_an_impact_to_what_is_after_it() -> None:
+    dataset = moving(("displacement", "velocity"))
+    (axis,) = figures.draw(dataset, "portrait").axes
+    (dots,) = (line for line in axis.lines if line.get_linestyle() == ":")
+    ends = dots.get_xydata().reshape(2, 3, 2)[:, :2]
+    after = np.searchsorted(dataset.time.values, dataset.impact_time.values)
+    states = np.column_stack([dataset.displacement.values, dataset.velocity.values])
+    np.testing.assert_array_equal(ends, np.stack([states[after - 1], states[after]], axis=1))
+
+
 def test_an_impact_map_has_each_impact_at_its_phase_and_velocity() -> None:
     (axis,) = figures.draw(moving(), "impact-map").axes
     (points,) = axis.get_lines()
