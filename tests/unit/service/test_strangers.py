@@ -68,7 +68,18 @@ def test_the_service_is_asked_by_its_addresses_and_the_names_of_its_owner(host: 
 @pytest.mark.parametrize("path", ["/inside", "/healthz"])
 @pytest.mark.parametrize(
     "host",
-    ["evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "192.0.2.7", "", "[::1", "x" * 9000],
+    [
+        "evil.example",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "evil.localhost",
+        "evillocalhost",
+        "local",
+        "192.0.2.7",
+        "",
+        "[::1",
+        "x" * 9000,
+    ],
 )
 def test_a_page_of_another_name_that_leads_here_is_not_answered(path: str, host: str) -> None:
     refused = asked(path, Host=host)
