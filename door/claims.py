@@ -38,7 +38,7 @@ def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> 
     >>> float(found.figure[0]), bool(found.is_met[0])
     (0.0, True)
     """
-    target = given_result(path)
+    target = given_result(path, [])
     found = dataset_of(measured_cases([only] if isinstance(only, str) else only))
     if target is not None:
         write_results(found, target, kind="hard_cases")

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene, scene_with_modes
+from vibroimpact.given import (
+    PathLike,
+    SceneLike,
+    given_output,
+    given_path,
+    given_paths,
+    given_scene,
+    scene_with_modes,
+)
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import export_system, import_system, load_system, say_notes
@@ -50,9 +58,11 @@ def export_fmu(
     --------
     >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
     """
+    chosen = given_scene(scene)
+    target = given_output(path, [scene, *chosen.files])
     return export_scene(
-        scene_with_modes(scene),
-        given_path(path),
+        scene_with_modes(chosen),
+        target,
         fmi=fmi,
         full=full,
         external=external,
@@ -105,9 +115,9 @@ def export_ssp(
     --------
     >>> export_ssp("two_oscillators.toml", "two.ssp")    # doctest: +SKIP
     """
-    return export_system(
-        given_scene(scene), given_path(path), ssp=ssp, fmi=fmi, gains=gains, platform=platform
-    )
+    chosen = given_scene(scene)
+    target = given_output(path, [scene, *chosen.files])
+    return export_system(chosen, target, ssp=ssp, fmi=fmi, gains=gains, platform=platform)
 
 
 def import_ssp(

@@ -79,19 +79,29 @@ def given_path(given: object) -> Path:
     return Path(given)
 
 
-def given_result(given: PathLike | None) -> Path | None:
-    """Return the dataset that a caller wants to be written as well, if any; it is looked at before anything runs.
+def given_output(given: object, read: Iterable[object]) -> Path:
+    """Return the file that a caller wants to be written; it is looked at before anything runs.
+
+    Parameters
+    ----------
+    given : path
+    read : iterable
+        What else the caller gives. Files among it are read, and are not written over.
 
     Raises
     ------
     UsageError
-        It is no name, or nothing can be written there.
+        It is no name, or one of a file that is read, or nothing can be written there.
     """
-    if given is None:
-        return None
     path = given_path(given)
-    refuse_outputs([], path, ending=path.suffix)
+    files = [Path(each) for each in read if isinstance(each, str | os.PathLike)]
+    refuse_outputs(files, path, ending=path.suffix)
     return path
+
+
+def given_result(given: PathLike | None, read: Iterable[object]) -> Path | None:
+    """Return the dataset that a caller wants to be written as well, if any: see `given_output`."""
+    return None if given is None else given_output(given, read)
 
 
 def given_paths(given: PathLike | Sequence[PathLike]) -> list[Path]:

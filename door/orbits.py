@@ -14,7 +14,7 @@ from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.given import PathLike, SceneLike, given_path, given_scene
+from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
 from vibroimpact.orchestrator.orbits.basins import (
     POINTS,
     Plane,
@@ -138,6 +138,7 @@ def follow(
     --------
     >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
     """
+    written = given_result(path, [scene])
     chosen = given_scene(scene, for_orbits=True)
     alone = chosen.unswept(varied=[parameter])
     if (second is None) != (second_range is None):
@@ -159,9 +160,9 @@ def follow(
         loci = follow_loci(FollowedLoci(followed, second), *ranges)
         result = loci if loci.loci else followed
     with ONE_AT_A_TIME, ScratchFolder("orbits") as folder:
-        target = Path(folder.name, "branches.nc") if path is None else given_path(path)
+        target = written or Path(folder.name, "branches.nc")
         write_dataset(result.dataset, target)
-        return open_dataset(target) if path is not None else in_memory(target)
+        return open_dataset(target) if written is not None else in_memory(target)
 
 
 def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.given import PathLike, SceneLike, given_path, given_paths, given_scene
+from vibroimpact.given import PathLike, SceneLike, given_paths, given_result, given_scene
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 
 
@@ -53,14 +53,11 @@ def replay(
     >>> found = replay("board.toml", "a0.nc", fit=["body.damping_ratio"], score="a1.nc")    # doctest: +SKIP
     >>> found.attrs["verdict"]                                                             # doctest: +SKIP
     """
+    fitted_on, scored = given_paths(recordings), given_paths(score)
+    chosen = given_scene(scene)
+    target = given_result(path, [scene, *chosen.files, *fitted_on, *scored])
     keys = fit if isinstance(fit, str) else ",".join(fit)
-    whole = replay_scene(
-        given_scene(scene),
-        given_paths(recordings),
-        fit=keys or None,
-        score=given_paths(score),
-        execution=execution,
-    )
-    if path is not None:
-        write_results(whole.dataset, given_path(path), kind="replay")
+    whole = replay_scene(chosen, fitted_on, fit=keys or None, score=scored, execution=execution)
+    if target is not None:
+        write_results(whole.dataset, target, kind="replay")
     return whole.dataset

@@ -9,7 +9,7 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.given import PathLike, SceneLike, given_path, prepared_scene, scene_with_modes
+from vibroimpact.given import PathLike, SceneLike, given_result, given_scene, prepared_scene, scene_with_modes
 from vibroimpact.orchestrator.campaign import SceneCost, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
@@ -46,7 +46,9 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     >>> str(run(tables).outcome.item())
     '0'
     """
-    chosen, target = prepared_scene(scene), None if path is None else given_path(path)
+    chosen = given_scene(scene)
+    target = given_result(path, [scene, *chosen.files])
+    chosen = prepared_scene(chosen)
     with ONE_AT_A_TIME, shown_progress() if progress else nullcontext(Progress()) as shown:
         if target is not None:
             run_scene(chosen, target, progress=shown)

@@ -9,7 +9,7 @@ import xarray as xr
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
-from vibroimpact.given import PathLike, given_path
+from vibroimpact.given import PathLike, given_path, given_result
 
 
 def sensitivity(
@@ -53,9 +53,10 @@ def sensitivity(
     --------
     >>> sensitivity("campaign").total_order.sel(quantity="displacement_range")    # doctest: +SKIP
     """
+    target = given_result(path, [dataset])
     opened = dataset if isinstance(dataset, xr.Dataset) else open_dataset(given_path(dataset))
     names = [of] if isinstance(of, str) else list(of)
     found = sensitivity_report(opened, names, level=level, resamples=resamples, seed=seed)
-    if path is not None:
-        write_results(found, given_path(path), kind="sensitivity")
+    if target is not None:
+        write_results(found, target, kind="sensitivity")
     return found.assign_attrs(results_kind="sensitivity")

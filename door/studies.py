@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.given import PathLike, SceneLike, given_result, scene_with_modes
+from vibroimpact.given import PathLike, SceneLike, given_result, given_scene, scene_with_modes
 from vibroimpact.orchestrator.study.accuracy import BUDGET, dataset_of, refuse_unreached, study_accuracy
 from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
 from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
@@ -54,8 +54,9 @@ def accuracy(
     'fused'
     """
     refuse_misuse(tolerance, of, budget)
-    target = given_result(path)
-    study = study_accuracy(scene_with_modes(scene), tolerance=tolerance, quantity=of, budget=budget)
+    chosen = given_scene(scene)
+    target = given_result(path, [scene, *chosen.files])
+    study = study_accuracy(scene_with_modes(chosen), tolerance=tolerance, quantity=of, budget=budget)
     dataset = dataset_of(study)
     if target is not None:
         write_results(dataset, target, kind="accuracy")
@@ -92,8 +93,9 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     >>> effects("examples/chatter.toml").attrs["not_simulated"].split(", ")[0]    # doctest: +SKIP
     'recorded drive'
     """
-    target = given_result(path)
-    chosen = scene_with_modes(scene)
+    chosen = given_scene(scene)
+    target = given_result(path, [scene, *chosen.files])
+    chosen = scene_with_modes(chosen)
     alone = chosen.unswept()
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
     if target is not None:

@@ -102,9 +102,11 @@ def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
     ComponentFileError
         The law has a mistake; the message has the line.
     UsageError
-        A file cannot be read or written.
+        A file cannot be read or written, or the FMU would take the place of the law.
     """
     law, output = Path(law), Path(output)
+    if output.exists() and law.exists() and output.samefile(law):
+        raise UsageError(f"{output}: expected a new file, got one that is read. Choose another name.")
     require_pythonfmu()
     with tempfile.TemporaryDirectory() as folder:
         script, law_file = Path(folder, "user_contact_law.py"), Path(folder, LAW_FILE)

@@ -54,10 +54,10 @@ def study_scene(
         raise UsageError(
             f"{option('write')}: expected a tolerance to tune for, got none. Add {option('tolerance')} 1e-6."
         )
-    refuse_outputs([path], output, figure)
+    opened = opened_scene(path, changes)
+    refuse_outputs([path, *opened.files], output, figure)
     if write is not None:
         refuse_outputs([path], write, ending=".toml")
-    opened = opened_scene(path, changes)
     refuse_overwriting(
         output,
         force,

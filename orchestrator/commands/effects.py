@@ -32,8 +32,8 @@ def show_effects(
     path: Path, changes: Sequence[str], output: Path | None, figure: Path | None, force: bool
 ) -> None:
     """Measure the effects of a scene, print them, and write what was asked for."""
-    refuse_outputs([path], output, figure)
     opened = opened_scene(path, changes)
+    refuse_outputs([path, *opened.files], output, figure)
     refuse_overwriting(
         output,
         force,

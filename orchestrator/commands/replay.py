@@ -51,7 +51,7 @@ def replay_recordings(
         _refuse_with_campaign(fit, score or None, save_scene, figure, execution)
         _campaign(with_recordings(loaded, recordings), output, workers, scheduler)
         return
-    refuse_outputs([scene, *recordings, *score], output, figure)
+    refuse_outputs([scene, *loaded.files, *recordings, *score], output, figure)
     named = with_recordings(loaded, recordings)
     refuse_overwriting(output, force, lambda there: holds_scene(there, named))
     if save_scene is not None:

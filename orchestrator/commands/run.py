@@ -31,7 +31,7 @@ def run_to_dataset(
     """
     began = time.perf_counter()
     loaded = opened_scene(scene, changes, strict=strict)
-    refuse_outputs([scene], output)
+    refuse_outputs([scene, *loaded.files], output)
     loaded = prepared(loaded)
     refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:

@@ -182,6 +182,14 @@ class Scene(SceneTable):
         return bool(self.channels) or self.falling_force
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """Files beside its own that a run of it reads: recordings that drive it, FMUs."""
+        folder = Path(self.source).parent
+        recordings = self.replay.recordings if self.replay is not None else ()
+        components = self.general.components if self.general is not None else ()
+        return (*(folder / name for name in recordings), *(component.fmu for component in components))
+
+    @property
     def runs(self) -> int:
         """How many runs the sweep has; 1 without one."""
         return run_count(self.sweep)

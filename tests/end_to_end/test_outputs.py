@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from harness import warm
 from support.command_line import ENTRY, in_this_process
+from support.replay_scenes import BOARD, hit
 
 SCENE = """
 [scene]
@@ -177,6 +178,18 @@ def test_imports_and_analyses_may_be_repeated_and_nothing_else_is_overwritten(tm
     misuse(in_this_process("spikes", recording, "-o", found), "--force")
     assert in_this_process("spikes", recording, "-o", found, "--force").returncode == 0
     assert in_this_process("spikes", recording, "-o", found).returncode == 0
+
+
+@pytest.mark.parametrize("command", ["run", "replay", "accuracy", "effects"])
+def test_a_recording_that_a_scene_names_is_not_written_over_with_force_either(
+    command: str, tmp_path: Path
+) -> None:
+    recording, scene = hit(tmp_path), tmp_path / "named.toml"
+    scene.write_text(BOARD.replace("[replay]", '[replay]\nrecordings = ["hit.nc"]'))
+    before = recording.read_bytes()
+    done = in_this_process(command, scene, "-o", recording, "--force")
+    misuse(done, "hit.nc: expected a new file, got one that is read")
+    assert recording.read_bytes() == before
 
 
 LARGE = {

@@ -16,7 +16,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from support.command_line import in_this_process
 from support.places import ROOT
-from support.still_clock import StillClock, stop_the_clock
+from support.replay_scenes import BOARD, hit
+from support.still_clock import StillClock, let_nothing_run, stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_dataset
@@ -285,6 +286,58 @@ def test_a_wrong_type_is_named_in_one_line(call, words):
         call()
     assert "\n" not in str(caught.value)
     str(caught.value).encode()
+
+
+WRITERS = {
+    "run": lambda read, path: vi.run(read / "scene.toml", path),
+    "accuracy": lambda read, path: vi.accuracy(read / "scene.toml", path),
+    "effects": lambda read, path: vi.effects(read / "scene.toml", path),
+    "follow": lambda read, path: vi.follow(read / "scene.toml", "forcing.angular_frequency", 0.9, 1.0, path),
+    "replay": lambda read, path: vi.replay(read / "replayed.toml", read / "hit.nc", path),
+    "replay of the scene's own": lambda read, path: vi.replay(read / "named.toml", path=path),
+    "run of a replay": lambda read, path: vi.run(read / "named.toml", path),
+    "scored": lambda read, path: vi.replay(read / "named.toml", path=path, score=read / "other.nc"),
+    "sensitivity": lambda read, path: vi.sensitivity(read / "hit.nc", path),
+    "an FMU": lambda read, path: vi.export_fmu(read / "scene.toml", path),
+    "a system": lambda read, path: vi.export_ssp(read / "scene.toml", path),
+}
+"""What writes a file, with what it reads."""
+READ = {
+    "replay": ("replayed.toml", "hit.nc"),
+    "replay of the scene's own": ("named.toml", "hit.nc"),
+    "run of a replay": ("named.toml", "hit.nc"),
+    "scored": ("named.toml", "hit.nc", "other.nc"),
+    "sensitivity": ("hit.nc",),
+}
+
+
+@pytest.fixture
+def read(tmp_path, monkeypatch):
+    """Return a folder of scenes and recordings where nothing that is simulated ends well."""
+    let_nothing_run(monkeypatch)
+    (tmp_path / "scene.toml").write_text(vi.Scene.from_dict(FORCED).to_toml())
+    (tmp_path / "replayed.toml").write_text(BOARD)
+    (tmp_path / "named.toml").write_text(BOARD.replace("[replay]", '[replay]\nrecordings = ["hit.nc"]'))
+    hit(tmp_path)
+    hit(tmp_path, "other.nc", 2)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_what_is_read_is_never_written_over(name, read):
+    for file in READ.get(name, ("scene.toml",)):
+        before = (read / file).read_bytes()
+        with pytest.raises(vi.VibroimpactError, match=f"{file}: expected a new file, got one that is read"):
+            WRITERS[name](read, read / file)
+        assert (read / file).read_bytes() == before
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_file_that_has_no_place_is_refused_before_anything_runs(name, read):
+    with pytest.raises(
+        vi.VibroimpactError, match="expected a place where a file can be written, got no folder"
+    ):
+        WRITERS[name](read, read / "nowhere" / "found.nc")
 
 
 def test_responses_and_signals_are_fitted_without_steps_between():

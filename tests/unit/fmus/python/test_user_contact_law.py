@@ -55,6 +55,16 @@ def make(tmp_path: Path) -> Callable[[str, str], Path]:
     return build
 
 
+def test_an_fmu_does_not_take_the_place_of_its_law(tmp_path: Path) -> None:
+    law, link = tmp_path / "law.py", tmp_path / "link.fmu"
+    law.write_text(SLOWING)
+    link.symlink_to(law)
+    for target in (law, link):
+        with pytest.raises(UsageError, match="expected a new file, got one that is read"):
+            build_user_contact_law(law, target)
+    assert law.read_text() == SLOWING
+
+
 class Slave:
     """An instance by FMPy's own class, and what it logs."""
 
