@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 import os
 import re
-from typing import Any
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -25,6 +28,12 @@ NUMERIC = frozenset(
 )
 _READ = NUMERIC | {"struct"}
 _DEEPEST = 8
+_MOST_FIELDS = 10_000
+"""Fields of one structure: scipy compares each name with all others, which takes .2 s of so many and 40 of 16 MiB."""
+_HEADER, _TAG, _BEGINNING = 128, 8, 256
+_MATRIX, _COMPRESSED = 14, 15
+_CELL, _STRUCTURE, _OBJECT = 1, 2, 3
+"""Classes of arrays that hold others."""
 
 
 def read_mat(path: os.PathLike[str] | str) -> RawFile:
@@ -39,7 +48,8 @@ def read_mat(path: os.PathLike[str] | str) -> RawFile:
     """
     from scipy.io import loadmat, whosmat
 
-    with one_refusal("a whole MATLAB file"):
+    with one_refusal("a whole MATLAB file"), open(path, "rb") as file:
+        _check_fields(file)
         listed = whosmat(path)
         _check_sizes(listed)
         chosen = [name for name, _, kind in listed if kind in _READ]
@@ -64,6 +74,77 @@ def _check_sizes(listed: list[tuple[str, tuple[int, ...], str]]) -> None:
     total = sum(math.prod(int(size) for size in shape) for _, shape, _ in listed)
     if total > MOST_SAMPLES:
         raise DatasetError(f"expected at most {MOST_SAMPLES} numbers, got {total}. Save fewer variables.")
+
+
+def _check_fields(file: BinaryIO) -> None:
+    """Refuse a structure of very many fields; what is no file of version 5 to 7, or damaged, is left to scipy."""
+    order = {b"IM": "<", b"MI": ">"}.get(file.read(_HEADER)[-2:])
+    if order is None:
+        return
+    try:
+        for matrix in _holders(file, order):
+            _check_fields_within(memoryview(matrix), order)
+    except (struct.error, zlib.error, IndexError, ZeroDivisionError):
+        return
+
+
+def _holders(file: BinaryIO, order: str) -> Iterator[bytes]:
+    """Yield the variables of a file that hold other arrays, without their tags; of others the beginning is read."""
+    while len(tag := file.read(_TAG)) == _TAG:
+        kind, size = struct.unpack(f"{order}II", tag)
+        following = file.tell() + size
+        head = file.read(min(size, _BEGINNING))
+        packed = kind == _COMPRESSED
+        begun = zlib.decompressobj().decompress(head, 3 * _TAG) if packed else tag + head
+        if (packed or kind == _MATRIX) and _class_of(memoryview(begun), order):
+            content = head + file.read(size - len(head))
+            yield zlib.decompress(content)[_TAG:] if packed else content
+        file.seek(following)
+
+
+def _class_of(matrix: memoryview, order: str) -> int:
+    """Return the class of an array that holds others, from its tag on; 0 of any other."""
+    found: int = struct.unpack_from(f"{order}I", matrix, 2 * _TAG)[0] & 0xFF
+    return found if found in (_CELL, _STRUCTURE, _OBJECT) else 0
+
+
+def _check_fields_within(matrix: memoryview, order: str) -> None:
+    left = [matrix]
+    while left:
+        inside = left.pop()
+        held = inside[_TAG] if order == "<" else inside[_TAG + 3]
+        place = _after(inside, _after(inside, 2 * _TAG, order), order)  # dimensions, name
+        if held == _OBJECT:
+            place = _after(inside, place, order)
+        if held != _CELL:
+            after = _after(inside, place, order)
+            longest = struct.unpack_from(f"{order}I", inside, after - (4 if after == place + _TAG else _TAG))[
+                0
+            ]
+            place = after
+            many = _size_of(inside, place, order) // longest
+            if many > _MOST_FIELDS:
+                raise DatasetError(
+                    f"expected at most {_MOST_FIELDS} fields of a structure, got {many}. Save fewer."
+                )
+            place = _after(inside, place, order)
+        while place + 3 * _TAG <= len(inside):
+            after = _after(inside, place, order)
+            if _class_of(inside[place : place + 3 * _TAG], order):
+                left.append(inside[place + _TAG : after])
+            place = after
+
+
+def _size_of(inside: memoryview, place: int, order: str) -> int:
+    """Return the bytes of an element; those of a small one are in its tag."""
+    kind, size = struct.unpack_from(f"{order}II", inside, place)
+    return int(kind >> 16 or size)
+
+
+def _after(inside: memoryview, place: int, order: str) -> int:
+    """Return where the element after one begins."""
+    kind, size = struct.unpack_from(f"{order}II", inside, place)
+    return place + _TAG if kind >> 16 else place + _TAG + -(-size // 8) * 8
 
 
 def _put(name: str, value: Any, scope: Scope, scopes: list[Scope], remarks: list[str]) -> None:

@@ -21,6 +21,8 @@ LIBRARY_SECONDS = 0.5
 """Processor time, s, that a library may take whatever its exponent, at the largest size that is allowed."""
 LAST_SECONDS = 2.0
 """Processor time of a reading, s, above which no larger content is tried."""
+LAST_MAKING = 10.0
+"""Processor time of making a content, s, above which no larger one is tried: its writer is none of ours."""
 LARGEST = 2**24
 """Bytes of the largest content that is tried, where the parser itself allows as many or more."""
 FIRST = 32
@@ -59,28 +61,31 @@ class Tokens:
 
 @dataclass(frozen=True)
 class Rung:
-    """Tokens of a content, its bytes, and the processor time of reading it, s."""
+    """Tokens of a content, its bytes, and the processor times of reading and of making it, s."""
 
     count: int
     size: int
     seconds: float
+    making: float
 
 
 def ladder(tokens: Tokens, folder: Path, rungs: int) -> list[Rung]:
     """Return the costs of n, 2n, 4n, ... tokens, at most so many, from the first that is worth comparing.
 
-    It ends at the size that is allowed, and where reading takes `LAST_SECONDS`.
+    It ends at the size that is allowed, where content grows no more, and where reading takes `LAST_SECONDS` or making
+    it `LAST_MAKING`.
     """
     found: list[Rung] = []
-    count = FIRST
+    count, size = FIRST, 0
     while len(found) < rungs:
         rung = _rung(tokens, count, folder)
-        if rung.size > tokens.most:
+        if not size < rung.size <= tokens.most:
             break
-        if found or rung.seconds >= FROM_SECONDS:
-            found.append(rung)
-        if rung.seconds > LAST_SECONDS:
+        # the first reading may have imported what reads
+        found = [*found, rung] if rung.seconds >= FROM_SECONDS else []
+        if rung.seconds > LAST_SECONDS or rung.making > LAST_MAKING:
             break
+        size = rung.size
         count *= 2 if found or rung.seconds > FROM_SECONDS / 8 else 4
     return found
 
@@ -129,13 +134,14 @@ def _said(rungs: Sequence[Rung]) -> str:
 
 
 def _rung(tokens: Tokens, count: int, folder: Path) -> Rung:
+    begun = time.process_time()
     content = tokens.content(count)
     path = folder / tokens.name
     path.write_bytes(content)
     began = time.process_time()
     with suppress(VibroimpactError):
         tokens.read(path)
-    return Rung(count, len(content), time.process_time() - began)
+    return Rung(count, len(content), time.process_time() - began, began - begun)
 
 
 def each(line: str, before: str = "", after: str = "") -> Made:

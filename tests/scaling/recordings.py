@@ -212,7 +212,7 @@ def _wav(chunks: list[bytes], channels: int = 1, samples: int = 3) -> bytes:
 
 WAV: Mapping[str, Made] = {
     "samples": lambda n: _wav([], samples=n),
-    "channels": lambda n: _wav([], channels=min(n, 60_000)),
+    "channels": lambda n: _wav([], channels=min(n, 32_000)),
     "chunks": lambda n: _wav([raw.wav_chunk(b"note", b"")] * n),
     "bytes of a chunk": lambda n: _wav([raw.wav_chunk(b"note", bytes(n))]),
     "bytes after the samples": lambda n: _wav([]) + bytes(n),

@@ -100,6 +100,22 @@ def test_one_dear_doubling_and_what_a_library_does_in_half_a_second_are_no_probl
     assert "squares: 1024 tokens" in str(problem_of(large, tmp_path, 8, "squares"))
 
 
-def test_a_ladder_ends_at_the_size_that_is_allowed(tmp_path: Path) -> None:
-    tokens = Tokens("any", "bytes", lambda n: b"x" * n, lambda path: path.read_bytes(), most=100)
-    assert ladder(tokens, tmp_path, RUNGS) == []
+@pytest.mark.parametrize("most_tokens", [100_000, 50], ids=["at the size that is allowed", "with its tokens"])
+def test_a_ladder_ends(most_tokens: int, tmp_path: Path) -> None:
+    def content(count: int) -> bytes:
+        return b"x" * min(count, most_tokens)
+
+    assert ladder(Tokens("any", "bytes", content, Path.read_bytes, most=100), tmp_path, RUNGS) == []
+
+
+def test_what_the_first_reading_imports_is_no_cost_of_its_tokens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(_growth, "time", clock)
+
+    def read(path: Path) -> None:
+        clock.now += 1e-5 * path.stat().st_size + (0.2 if clock.now == 0.0 else 0.0)
+
+    found = ladder(Tokens("any", "bytes", lambda n: b"x" * n, read), tmp_path, RUNGS)
+    assert [rung.count for rung in found] == [2048, 4096, 8192]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +15,7 @@ from scipy.io import savemat
 
 from vibroimpact.analysis.recording import Quality, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.hardware.formats.mat import read_mat
 from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 RANDOM = np.random.default_rng(8)
@@ -44,6 +48,55 @@ def test_vectors_that_ascend_unevenly_are_events(tmp_path: Path) -> None:
     recording = import_recording([matlab(tmp_path, low=low, high=high)])
     np.testing.assert_array_equal(recording.events["high"].times, high)
     assert len(recording.events["low"].times) == 40
+
+
+def fields(count: int) -> dict[str, np.ndarray]:
+    return {f"f{number}": np.arange(3.0) for number in range(count)}
+
+
+@pytest.mark.parametrize("is_compressed", [False, True])
+@pytest.mark.parametrize(
+    "place",
+    [
+        lambda within: {"s": within},
+        lambda within: {"s": {"a": {"b": within}}},
+        lambda within: {"c": np.array([1.0, within, "x"], dtype=object)},
+    ],
+    ids=["a variable", "in structures", "in a cell"],
+)
+def test_a_structure_of_very_many_fields_is_refused_before_scipy_compares_their_names(
+    place: Callable[[Any], dict[str, Any]],
+    is_compressed: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "record.mat"
+    savemat(path, {"t": np.arange(9.0)} | place(fields(10_001)), do_compression=is_compressed)
+    monkeypatch.setattr("scipy.io.whosmat", None)
+    with pytest.raises(DatasetError, match="expected at most 10000 fields of a structure, got 10001"):
+        read_mat(path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_fields_are_counted_in_files_of_both_byte_orders_and_damage_is_left_to_scipy(
+    order: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "record.mat"
+    savemat(path, {"s": fields(3)})
+    content = bytearray(path.read_bytes())
+    many = struct.pack(f"{order}II", 14, 48) + struct.pack(f"{order}IIII", 6, 8, 2, 0)
+    many += struct.pack(f"{order}HHI", *((4, 5) if order == ">" else (5, 4)), 1)  # small: dimensions
+    many += struct.pack(f"{order}II", 1, 0) + struct.pack(
+        f"{order}HHI", *((4, 5) if order == ">" else (5, 4)), 1
+    )
+    many += struct.pack(f"{order}II", 1, 10_001)
+    path.write_bytes(bytes(content[:126]) + (b"MI" if order == ">" else b"IM") + many)
+    with pytest.raises(DatasetError, match="got 10001"):
+        read_mat(path)
+    for cut in range(0, len(content), 7):
+        path.write_bytes(content[:cut])
+        with suppress(DatasetError):
+            read_mat(path)
 
 
 def test_what_is_no_vector_of_numbers_is_left_out_and_told(tmp_path: Path) -> None:
