@@ -108,9 +108,12 @@ def problem_of(tokens: Tokens, folder: Path, rungs: int, library: str = "") -> s
 
 
 def _is_steep(rungs: Sequence[Rung]) -> bool:
-    """Whether each of two doublings costs too much: a table that no longer fits a cache makes one of them dear."""
+    """Whether each of two doublings costs too much: a table that no longer fits a cache makes one of them dear.
+
+    Where content grows faster than its tokens, as rows do that widen, its bytes count.
+    """
     return all(
-        after.seconds > before.seconds * (after.count / before.count) ** STEEPEST
+        after.seconds > before.seconds * max(after.count / before.count, after.size / before.size) ** STEEPEST
         for before, after in pairwise(rungs)
     )
 
