@@ -59,7 +59,7 @@ def export_fmu(
     >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
     """
     chosen = given_scene(scene)
-    target = given_output(path, [scene, *chosen.files])
+    target = given_output(path, [scene, chosen])
     return export_scene(
         scene_with_modes(chosen),
         target,
@@ -116,7 +116,7 @@ def export_ssp(
     >>> export_ssp("two_oscillators.toml", "two.ssp")    # doctest: +SKIP
     """
     chosen = given_scene(scene)
-    target = given_output(path, [scene, *chosen.files])
+    target = given_output(path, [scene, chosen])
     return export_system(chosen, target, ssp=ssp, fmi=fmi, gains=gains, platform=platform)
 
 

@@ -86,7 +86,7 @@ def given_output(given: object, read: Iterable[object]) -> Path:
     ----------
     given : path
     read : iterable
-        What else the caller gives. Files among it are read, and are not written over.
+        What else the caller gives. Files among it, and those of scenes, are read, and are not written over.
 
     Raises
     ------
@@ -94,7 +94,12 @@ def given_output(given: object, read: Iterable[object]) -> Path:
         It is no name, or one of a file that is read, or nothing can be written there.
     """
     path = given_path(given)
-    files = [Path(each) for each in read if isinstance(each, str | os.PathLike)]
+    files: list[Path] = []
+    for each in read:
+        if isinstance(each, Scene):
+            files += [Path(each.source), *each.files]
+        elif isinstance(each, str | os.PathLike):
+            files.append(Path(each))
     refuse_outputs(files, path, ending=path.suffix)
     return path
 

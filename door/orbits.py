@@ -138,8 +138,8 @@ def follow(
     --------
     >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
     """
-    written = given_result(path, [scene])
     chosen = given_scene(scene, for_orbits=True)
+    written = given_result(path, [scene, chosen])
     alone = chosen.unswept(varied=[parameter])
     if (second is None) != (second_range is None):
         raise UsageError("follow: second: expected a key and its range together, got one of them.")

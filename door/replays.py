@@ -55,7 +55,7 @@ def replay(
     """
     fitted_on, scored = given_paths(recordings), given_paths(score)
     chosen = given_scene(scene)
-    target = given_result(path, [scene, *chosen.files, *fitted_on, *scored])
+    target = given_result(path, [scene, chosen, *fitted_on, *scored])
     keys = fit if isinstance(fit, str) else ",".join(fit)
     whole = replay_scene(chosen, fitted_on, fit=keys or None, score=scored, execution=execution)
     if target is not None:

@@ -47,7 +47,7 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     '0'
     """
     chosen = given_scene(scene)
-    target = given_result(path, [scene, *chosen.files])
+    target = given_result(path, [scene, chosen])
     chosen = prepared_scene(chosen)
     with ONE_AT_A_TIME, shown_progress() if progress else nullcontext(Progress()) as shown:
         if target is not None:

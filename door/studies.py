@@ -55,7 +55,7 @@ def accuracy(
     """
     refuse_misuse(tolerance, of, budget)
     chosen = given_scene(scene)
-    target = given_result(path, [scene, *chosen.files])
+    target = given_result(path, [scene, chosen])
     study = study_accuracy(scene_with_modes(chosen), tolerance=tolerance, quantity=of, budget=budget)
     dataset = dataset_of(study)
     if target is not None:
@@ -94,7 +94,7 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     'recorded drive'
     """
     chosen = given_scene(scene)
-    target = given_result(path, [scene, *chosen.files])
+    target = given_result(path, [scene, chosen])
     chosen = scene_with_modes(chosen)
     alone = chosen.unswept()
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)

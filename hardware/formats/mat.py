@@ -118,9 +118,8 @@ def _check_fields_within(matrix: memoryview, order: str) -> None:
             place = _after(inside, place, order)
         if held != _CELL:
             after = _after(inside, place, order)
-            longest = struct.unpack_from(f"{order}I", inside, after - (4 if after == place + _TAG else _TAG))[
-                0
-            ]
+            at = after - (4 if after == place + _TAG else _TAG)  # a small element has its number in its tag
+            (longest,) = struct.unpack_from(f"{order}I", inside, at)
             place = after
             many = _size_of(inside, place, order) // longest
             if many > _MOST_FIELDS:

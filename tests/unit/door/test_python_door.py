@@ -290,6 +290,7 @@ def test_a_wrong_type_is_named_in_one_line(call, words):
 
 WRITERS = {
     "run": lambda read, path: vi.run(read / "scene.toml", path),
+    "run of a scene that was read": lambda read, path: vi.run(vi.Scene.from_file(read / "scene.toml"), path),
     "accuracy": lambda read, path: vi.accuracy(read / "scene.toml", path),
     "effects": lambda read, path: vi.effects(read / "scene.toml", path),
     "follow": lambda read, path: vi.follow(read / "scene.toml", "forcing.angular_frequency", 0.9, 1.0, path),
@@ -301,7 +302,7 @@ WRITERS = {
     "an FMU": lambda read, path: vi.export_fmu(read / "scene.toml", path),
     "a system": lambda read, path: vi.export_ssp(read / "scene.toml", path),
 }
-"""What writes a file, with what it reads."""
+"""Calls that write a file, by what they are."""
 READ = {
     "replay": ("replayed.toml", "hit.nc"),
     "replay of the scene's own": ("named.toml", "hit.nc"),
