@@ -1,7 +1,8 @@
-"""What completion, `help()` and `--help` see: `python -P tests/support/public_names.py` writes both lists anew.
+"""What users hold on to, as text: `python -P tests/support/public_names.py` writes all of it anew.
 
 Names have their signature and the first line of their description. Commands have the options that typer knows of: the
-boxes around them change with the versions of typer and rich.
+boxes around them change with the versions of typer and rich. The service has its OpenAPI document, a scene its keys,
+a dataset its variables and attributes.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import enum
 import inspect
 import re
+import sys
 import typing
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,8 +22,11 @@ import typer
 import vibroimpact as vi
 from vibroimpact.orchestrator.commands.cli import app, load_commands
 
-FOLDER = Path(__file__).resolve().parents[1] / "unit" / "door"
-NAMES, COMMANDS = FOLDER / "names.txt", FOLDER / "commands.txt"
+TESTS = Path(__file__).resolve().parents[1]
+NAMES, COMMANDS = TESTS / "unit" / "door" / "names.txt", TESTS / "unit" / "door" / "commands.txt"
+OPENAPI = TESTS / "unit" / "service" / "openapi.json"
+SCENE_KEYS = TESTS / "unit" / "orchestrator" / "scene" / "keys.txt"
+DATASETS = TESTS / "end_to_end" / "datasets.txt"
 
 
 def names() -> str:
@@ -115,6 +120,17 @@ def _parameter(given: Any, annotation: Any) -> str:
     return f"{' '.join((*given.opts, *given.secondary_opts))} ({', '.join(said)}): {declared.help or ''}"
 
 
+def main() -> None:
+    """Write each text into its file."""
+    sys.path.insert(0, str(TESTS))
+    from support.dataset_kinds import datasets
+    from support.openapi import openapi
+    from support.scene_keys import scene_keys
+
+    texts = {NAMES: names, COMMANDS: commands, OPENAPI: openapi, SCENE_KEYS: scene_keys, DATASETS: datasets}
+    for path, text in texts.items():
+        path.write_text(text(), encoding="utf-8")
+
+
 if __name__ == "__main__":
-    NAMES.write_text(names(), encoding="utf-8")
-    COMMANDS.write_text(commands(), encoding="utf-8")
+    main()

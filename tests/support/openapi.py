@@ -1,0 +1,27 @@
+"""The OpenAPI document of the service, as its clients see it."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+from vibroimpact.service.api import application
+from vibroimpact.service.fmus import FmuStore
+from vibroimpact.service.recordings import RecordingStore
+from vibroimpact.service.scenes import Shelf
+from vibroimpact.service.sessions import Sessions
+from vibroimpact.service.store import Store
+from vibroimpact.service.supervisor import Supervisor
+
+
+def openapi() -> str:
+    """Return the document in a fixed order, without the version of the package."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        store = Store(folder)
+        shelf = Shelf(RecordingStore(store), FmuStore(folder / "fmus", False))
+        document = application(store, Supervisor(store), shelf, Sessions("token")).openapi()
+        store.close()
+    del document["info"]["version"]
+    return json.dumps(document, indent=1, sort_keys=True) + "\n"
