@@ -92,7 +92,7 @@ def run(folder: Path, work: Work) -> None:
     """Do the work of a job in its folder."""
     progress = Told()
     if work.kind == "estimate":
-        from vibroimpact.service.estimates import estimate
+        from vibroimpact.service.requests import estimate
 
         progress.begin(1, 0)
         estimate(folder, work.options)

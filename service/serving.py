@@ -6,7 +6,7 @@ import asyncio
 import ipaddress
 import logging
 import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from vibroimpact.service.connections import Connections, limited, most_connectio
 from vibroimpact.service.fmus import FmuStore
 from vibroimpact.service.hosts import Hosts
 from vibroimpact.service.logs import write_lines
+from vibroimpact.service.operations.serve import Serve
 from vibroimpact.service.ownership import URL_FILE, refuse_foreign_folder
 from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.scenes import Shelf
@@ -42,17 +43,8 @@ LAST_SECONDS = 2
 """For answers that are under way when the service is told to end."""
 
 
-def serve(
-    folder: Path,
-    *,
-    host: str,
-    port: int,
-    scheduler: str | None,
-    allow_remote: bool,
-    allow_fmu_upload: bool = False,
-    names: Sequence[str] = (),
-) -> None:
-    """Serve until a signal ends it; `names` are names of hosts by which others ask for it.
+def serve(options: Serve) -> None:
+    """Serve until a signal ends it.
 
     Raises
     ------
@@ -60,19 +52,20 @@ def serve(
         The folder or the port is taken, the address is not of this machine alone and nobody allowed that, or nothing
         is reached over loopback.
     """
-    _refuse_remote(host, allow_remote)
+    folder, host = options.data, options.host
+    _refuse_remote(host, options.allow_remote)
     refuse_no_loopback("the service and its jobs are reached")
-    hosts = Hosts(host, names)
+    hosts = Hosts(host, options.allow_host or ())
     _make_own(folder)
     with locked_folder(folder, "service"):
         token = token_of(folder)
         sessions = Sessions(token)
         hold_at_most(FMUS_HELD)
-        with _bound(host, port) as listening:
+        with _bound(host, options.port) as listening:
             write_lines()
             store = Store(folder)
-            shelf = Shelf(RecordingStore(store), FmuStore(folder / "fmus", allow_fmu_upload))
-            supervisor = Supervisor(store, scheduler)
+            shelf = Shelf(RecordingStore(store), FmuStore(folder / "fmus", options.allow_fmu_upload))
+            supervisor = Supervisor(store, options.scheduler)
             supervisor.start()
             try:
                 port = listening.getsockname()[1]

@@ -1,7 +1,1 @@
-"""The commands of this package: `options` declares them, a module for each is what it does."""
-
-from __future__ import annotations
-
-from vibroimpact.analysis.commands.options import register
-
-__all__ = ["register"]
+"""What the operations of this package do on the command line, a module for each."""

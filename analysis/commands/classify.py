@@ -6,8 +6,10 @@ from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from vibroimpact.analysis.commands.found import refuse_places
 from vibroimpact.analysis.dataset import dataset_file, open_dataset, read_flat, write_dataset
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.dataset.outputs import writing
+from vibroimpact.analysis.operations.classify import Classify
 from vibroimpact.analysis.orbits.classify import RunClass, classify, with_classes
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.printing import table
@@ -16,11 +18,11 @@ from vibroimpact.fmus.terminal import say, wide_terminal
 _MADE_BY = "classified_from"
 
 
-def show_classes(path: Path, output: Path | None, figure: Path | None, force: bool) -> None:
+def show_classes(options: Classify) -> None:
     """Classify the runs of a dataset; print how many there are of each class, write and draw them."""
+    path, output, figure = options.file, options.output, options.figure
     file = dataset_file(path)
-    refuse_outputs([file], output, figure)
-    refuse_overwriting(output, force, lambda there: there.get(_MADE_BY) == str(path))
+    refuse_places(options, [file], **{_MADE_BY: str(path)})
     with open_dataset(file) as dataset:
         try:
             classes = classify(dataset)

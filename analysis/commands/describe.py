@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from rich.table import Table
 
 from vibroimpact.analysis.commands.opened_file import opened_file
 from vibroimpact.analysis.dataset import dataset_file
+from vibroimpact.analysis.operations.describe import Describe
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.analysis.recording.table import print_recording
 from vibroimpact.fmus.printing import table, with_error
@@ -32,7 +32,7 @@ _FITTED = ("parameter", "fitted_value", "start_value", "standard_error")
 _NOTES = ("title", "history", "engine", "channel", "verdict")
 
 
-def describe_file(path: Path) -> None:
+def describe_file(options: Describe) -> None:
     """Print what a file of this package holds.
 
     Raises
@@ -40,7 +40,7 @@ def describe_file(path: Path) -> None:
     DatasetError
         The file is missing, damaged or foreign.
     """
-    file = dataset_file(path)
+    file = dataset_file(options.file)
     console = wide_terminal()
     with opened_file(file) as data:
         console.print(f"{file}: {_kind(data)}", soft_wrap=True)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import xarray as xr
 
 from vibroimpact.analysis.commands.estimate_scene import (
-    ImpactOptions,
     cut,
     force_amplitude,
     forcing_and_known,
+    refuse_numbers,
     side_of_stop,
 )
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.commands.found import refuse_places
+from vibroimpact.analysis.dataset.outputs import writing
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.dataset.schema import scene_of
@@ -30,43 +30,38 @@ from vibroimpact.analysis.decay.swept_response import swept_response
 from vibroimpact.analysis.estimation.estimates import print_impacts
 from vibroimpact.analysis.estimation.flight_times import estimate_bounces
 from vibroimpact.analysis.estimation.impacts import estimate_impacts
+from vibroimpact.analysis.operations.estimate_bounces import EstimateBounces
+from vibroimpact.analysis.operations.estimate_decay import EstimateDecay
+from vibroimpact.analysis.operations.estimate_impacts import EstimateImpacts
+from vibroimpact.analysis.operations.estimate_response import EstimateResponse
 from vibroimpact.analysis.recording import Channel, Recording, is_recording, open_signals
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
-
-@dataclass(frozen=True, slots=True)
-class Estimation:
-    """What every estimation is asked for: the options that all of them have, the window in s."""
-
-    data: Path
-    channel: str | None
-    start: float | None
-    stop: float | None
-    run: int | None
-    output: Path | None
-    figure: Path | None
-    force: bool
+Estimation = EstimateDecay | EstimateImpacts | EstimateBounces | EstimateResponse
+"""Estimations, which all say data, channel, window, run, places."""
 
 
-def decay_of(asked: Estimation, law: str, cubic: bool, periods: float | None) -> None:
+def decay_of(options: EstimateDecay) -> None:
     """Estimate a free decay: with all damping laws, none, or one."""
-    with _estimating(asked) as console:
+    law = options.law
+    with _estimating(options) as console:
         laws = () if law == "none" else ALL_LAWS if law == "all" else (damping_law(law),)
-        recording = open_signals(asked.data, asked.run)
-        samples = decay_samples(_channel(recording, asked.channel), asked.start, asked.stop)
-        found = estimate_decay(samples, laws, cubic=cubic, periods=periods)
+        recording = open_signals(options.data, options.run)
+        samples = decay_samples(_channel(recording, options.channel), options.start, options.stop_time)
+        found = estimate_decay(samples, laws, cubic=options.cubic, periods=options.periods)
         print_decay(console, found)
-    _write(console, _sourced(found.dataset(), asked.data, recording), asked)
+    _write(console, _sourced(found.dataset(), options.data, recording), options)
 
 
-def impacts_of(asked: Estimation, options: ImpactOptions) -> None:
+def impacts_of(options: EstimateImpacts) -> None:
     """Estimate motion against a stop, with or without a force that oscillates."""
-    with _estimating(asked) as console:
-        recording = open_signals(asked.data, asked.run)
-        channel = _channel(recording, asked.channel)
-        forcing, known = forcing_and_known(asked.data, asked.run, recording, channel, options)
-        part = cut(channel, asked.start, asked.stop)
+    refuse_numbers(options)
+    with _estimating(options) as console:
+        recording = open_signals(options.data, options.run)
+        channel = _channel(recording, options.channel)
+        forcing, known = forcing_and_known(options, recording, channel)
+        part = cut(channel, options.start, options.stop_time)
         found = (
             estimate_bounces(part, side=known.side)
             if forcing is None
@@ -74,72 +69,62 @@ def impacts_of(asked: Estimation, options: ImpactOptions) -> None:
         )
         print_impacts(console, found)
     dataset = found.dataset().assign_attrs(estimates="impacts")
-    _write(console, _sourced(dataset, asked.data, recording), asked)
+    _write(console, _sourced(dataset, options.data, recording), options)
 
 
-def bounces_of(asked: Estimation, side: str | None) -> None:
+def bounces_of(options: EstimateBounces) -> None:
     """Estimate the restitution of a body that bounces under a constant force."""
+    side = options.side
     if side not in (None, "upper", "lower"):
         raise UsageError(f'--side: expected upper or lower, got "{side}".')
-    with _estimating(asked) as console:
-        recording = open_signals(asked.data, asked.run)
-        channel = _channel(recording, asked.channel)
-        seen = side or side_of_stop(asked.data, asked.run, recording, channel)
-        found = estimate_bounces(cut(channel, asked.start, asked.stop), side=seen)
+    with _estimating(options) as console:
+        recording = open_signals(options.data, options.run)
+        channel = _channel(recording, options.channel)
+        seen = side or side_of_stop(options.data, options.run, recording, channel)
+        found = estimate_bounces(cut(channel, options.start, options.stop_time), side=seen)
         print_impacts(console, found)
     dataset = found.dataset().assign_attrs(estimates="bounces")
-    _write(console, _sourced(dataset, asked.data, recording), asked)
+    _write(console, _sourced(dataset, options.data, recording), options)
 
 
-def response_of(
-    asked: Estimation,
-    drive: str | None,
-    form: str,
-    band: tuple[float, float] | None,
-    segment: int | None,
-    window: str,
-    estimator: str,
-) -> None:
+def response_of(options: EstimateResponse) -> None:
     """Estimate a resonance from two channels, or from a simulated sweep of the frequency."""
+    drive, band, estimator = options.drive, options.band, options.estimator
     if estimator not in ("h1", "h2"):
         raise UsageError(f'--estimator: expected h1 or h2, got "{estimator}".')
-    with _estimating(asked) as console:
-        if drive is None and is_recording(asked.data):
+    with _estimating(options) as console:
+        if drive is None and is_recording(options.data):
             raise UsageError("--drive: expected the channel that drives, got none. Name it.")
         if drive is None:
-            dataset = _swept(console, asked.data, band)
+            dataset = _swept(console, options.data, band)
         else:
-            recording = open_signals(asked.data, asked.run)
+            recording = open_signals(options.data, options.run)
             others = [name for name in recording.channels if name != drive]
-            answer = recording.channel(asked.channel or (others[0] if len(others) == 1 else None))
+            answer = recording.channel(options.channel or (others[0] if len(others) == 1 else None))
             found = frequency_response(
                 recording.channel(drive),
                 answer,
-                segment=segment,
-                window=window,
-                start=asked.start,
-                stop=asked.stop,
+                segment=options.segment,
+                window=options.window,
+                start=options.start,
+                stop=options.stop_time,
             )
-            resonance = fit_resonance(curve_of(found, form, band, estimator))
+            resonance = fit_resonance(curve_of(found, options.form, band, estimator))
             title = f"Response of {answer.name} to {drive}"
             remarks = (*recording.remarks_counted, *found.remarks, *resolution_remark(found, resonance))
             estimates = ResponseEstimates(resonance, found, title, found.unit, remarks)
-            dataset = _sourced(_shown_response(console, estimates), asked.data, recording)
-    _write(console, dataset, asked)
+            dataset = _sourced(_shown_response(console, estimates), options.data, recording)
+    _write(console, dataset, options)
 
 
 @contextmanager
-def _estimating(asked: Estimation) -> Iterator[Terminal]:
+def _estimating(options: Estimation) -> Iterator[Terminal]:
     """Refuse files that cannot be written, and begin the message of what has no answer with the name of its data."""
-    refuse_outputs([asked.data], asked.output, asked.figure)
-    same = ("estimates", asked.data.name)
-    refuse_overwriting(
-        asked.output, asked.force, lambda there: (there.get("results_kind"), there.get("source_file")) == same
-    )
+    refuse_places(options, [options.data], results_kind="estimates", source_file=options.data.name)
     try:
         yield wide_terminal()
     except EstimationError as problem:
-        raise EstimationError(f"{asked.data}: {problem}") from problem
+        raise EstimationError(f"{options.data}: {problem}") from problem
 
 
 def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
@@ -176,17 +161,17 @@ def _sourced(dataset: xr.Dataset, data: Path, recording: Recording) -> xr.Datase
     return dataset.assign_attrs(source_file=data.name, **known)
 
 
-def _write(console: Terminal, dataset: xr.Dataset, asked: Estimation) -> None:
+def _write(console: Terminal, dataset: xr.Dataset, options: Estimation) -> None:
     """Write what was asked for, and say so."""
-    if asked.output is not None:
-        with writing(asked.output):
-            write_results(dataset, asked.output, kind="estimates")
-        console.print(f"Estimates written to {asked.output}.")
-    if asked.figure is not None:
-        with writing(asked.figure):
+    if options.output is not None:
+        with writing(options.output):
+            write_results(dataset, options.output, kind="estimates")
+        console.print(f"Estimates written to {options.output}.")
+    if options.figure is not None:
+        with writing(options.figure):
             # matplotlib takes half a second to import; estimates alone do not pay for it.
             from vibroimpact.analysis.figures import save
             from vibroimpact.analysis.figures.measured.estimates import draw_estimates
 
-            save(draw_estimates(dataset), asked.figure)
-        console.print(f"Figure written to {asked.figure}.")
+            save(draw_estimates(dataset), options.figure)
+        console.print(f"Figure written to {options.figure}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import file_name_of, scene_of, swept_names
 from vibroimpact.analysis.estimation.physics import Forcing, Known
+from vibroimpact.analysis.operations.estimate_impacts import EstimateImpacts
 from vibroimpact.analysis.recording import Channel, Recording, is_recording
 from vibroimpact.fmus.errors import UsageError
 
@@ -22,42 +23,28 @@ _NUMBERED = re.compile(r"(\w+)\[(\d+)\]")
 
 
 _ABOVE_0 = "a number > 0"
-_OPTION_RULES = {
+_RULES = {
     **dict.fromkeys(("natural_frequency", "mass"), _ABOVE_0),
     **dict.fromkeys(("forcing_frequency", "angular_frequency", "damping_ratio"), "a number >= 0"),
+    **dict.fromkeys(("amplitude", "static_deflection", "phase", "stop", "offset"), "a finite number"),
 }
+"""Rules of the numbers that a person gives."""
 
 
-@dataclass(frozen=True, slots=True)
-class ImpactOptions:
-    """What a person says about impacting motion; None: not said.
+def refuse_numbers(options: EstimateImpacts) -> None:
+    """Refuse numbers that break their rules.
 
-    Forcing and natural frequency are in Hz, the angular frequency of the force in rad/s, its amplitude in N, its phase
-    in rad, the mass in kg; static deflection (force over stiffness), stop and offset (what the channel reads at rest)
-    in the unit of the channel. A forcing frequency of 0 says that no force oscillates; with `clock_drifts` it is a
-    start value only.
+    Raises
+    ------
+    UsageError
     """
-
-    forcing_frequency: float | None = None
-    angular_frequency: float | None = None
-    amplitude: float | None = None
-    static_deflection: float | None = None
-    phase: float | None = None
-    stop: float | None = None
-    natural_frequency: float | None = None
-    damping_ratio: float | None = None
-    mass: float | None = None
-    offset: float | None = None
-    clock_drifts: bool = False
-
-    def __post_init__(self) -> None:
-        for name, value in ((item.name, getattr(self, item.name)) for item in fields(self)):
-            rule = _OPTION_RULES.get(name, "a finite number")
-            low = 0.0 if name in _OPTION_RULES else -math.inf
-            if isinstance(value, float) and not (math.isfinite(value) and value >= low):
-                raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got {value:g}.")
-            if value == 0.0 and rule == _ABOVE_0:
-                raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got 0.")
+    for name, rule in _RULES.items():
+        value = getattr(options, name)
+        if value is None:
+            continue
+        low = -math.inf if rule == "a finite number" else 0.0
+        if not (math.isfinite(value) and value >= low) or (value == 0.0 and rule == _ABOVE_0):
+            raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got {value:g}.")
 
 
 def kind_of(data: Path, *, one_run: bool) -> str:
@@ -151,7 +138,7 @@ def _rest(scene: Mapping[str, Any], reading: _Reading) -> float | None:
 
 
 def forcing_and_known(
-    data: Path, run: int | None, recording: Recording, channel: Channel, options: ImpactOptions
+    options: EstimateImpacts, recording: Recording, channel: Channel
 ) -> tuple[Forcing | None, Known]:
     """Return the force, and what is known of oscillator and stop: from the options, else from the scene.
 
@@ -164,7 +151,7 @@ def forcing_and_known(
     UsageError
         The forcing frequency is not known, or options contradict each other.
     """
-    scene = run_scene(data, run, recording)
+    scene = run_scene(options.data, options.run, recording)
     reading = _reading_of(channel, scene)
     natural = None if options.natural_frequency is None else 2.0 * math.pi * options.natural_frequency
     frequency = _angular_frequency(scene, options)
@@ -203,7 +190,7 @@ def _only_stop(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     return stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
 
 
-def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> float:
+def _angular_frequency(scene: Mapping[str, Any], options: EstimateImpacts) -> float:
     if options.forcing_frequency is not None and options.angular_frequency is not None:
         raise UsageError(
             "--forcing-frequency: expected it without --angular-frequency, got both. Leave one out."
@@ -236,7 +223,7 @@ def _scene_phase(scene: Mapping[str, Any], reading: _Reading) -> float | None:
 
 
 def _static_deflection(
-    scene: Mapping[str, Any], options: ImpactOptions, natural: float | None, reading: _Reading
+    scene: Mapping[str, Any], options: EstimateImpacts, natural: float | None, reading: _Reading
 ) -> float | None:
     if options.static_deflection is not None:
         return options.static_deflection

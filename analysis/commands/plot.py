@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import nullcontext
-from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
@@ -13,17 +10,20 @@ from vibroimpact.analysis import figures
 from vibroimpact.analysis.commands.opened_file import opened_file
 from vibroimpact.analysis.dataset import dataset_file
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, writing
+from vibroimpact.analysis.operations.plot import Plot
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.terminal import say
 
+_DRAWN = ("recording", "start", "stop", "periods", "segment", "variable", "title", "width", "height")
+"""Arguments that `figures.draw` has too."""
 
-def draw_file(
-    file: Path, output: Path, kind: str, run: int | None, options: Mapping[str, Any], over: Path | None = None
-) -> None:
-    """Draw a file that this package wrote, over another one; the options are those of `figures.draw`."""
-    file = dataset_file(file)
-    below = None if over is None else dataset_file(over)
+
+def draw_file(options: Plot) -> None:
+    """Draw a file that this package wrote, over another one."""
+    file, output = dataset_file(options.file), options.output
+    drawn = {name: getattr(options, name) for name in _DRAWN}
+    below = None if options.over is None else dataset_file(options.over)
     refuse_outputs([file, *([] if below is None else [below])], None, output)
     with opened_file(file) as data, nullcontext() if below is None else opened_file(below) as other:
         if isinstance(other, Recording):
@@ -35,7 +35,7 @@ def draw_file(
                 "`vibroimpact spikes --figure` draws them beside the signal."
             )
         try:
-            figure = figures.draw(data, kind, run, **options, over=other)
+            figure = figures.draw(data, options.kind, options.run, **drawn, over=other)
         except (LookupError, ValueError, TypeError, AttributeError) as problem:
             # results may lack what their figure shows, or be another's
             if results is None:

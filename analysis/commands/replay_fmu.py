@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs
+from vibroimpact.analysis.operations.fmu_replay import ExportReplay
 from vibroimpact.analysis.recording import Channel, Quality, Recording, open_signals
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
@@ -18,21 +18,16 @@ from vibroimpact.fmus.terminal import say
 EVEN = 0.01
 
 
-def build_player(
-    recording: Path,
-    output: Path,
-    channel: Sequence[str],
-    si: bool,
-    run: int | None,
-    fmi: str = "3.0",
-    platform: str | None = None,
-) -> None:
+def build_player(options: ExportReplay) -> None:
     """Write the FMU that plays channels of a recording, all without a name, and say what it plays."""
-    refuse_outputs([recording], output, ending=".fmu")
-    source = open_signals(recording, run)
-    chosen = _chosen(source, channel)
+    output, si = options.output, options.si
+    refuse_outputs([options.recording], output, ending=".fmu")
+    source = open_signals(options.recording, options.run)
+    chosen = _chosen(source, options.channel or ())
     signals = {item.name: replay_signal(item, si=si) for item in chosen}
-    build_replay(signals, output, fmi=fmi, platform=platform, note=lambda text: say(text, err=True))
+    build_replay(
+        signals, output, fmi=options.fmi, platform=options.platform, note=lambda text: say(text, err=True)
+    )
     for item in chosen:
         say(_described(item, si))
     say(str(output))

@@ -2,54 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.commands.found import refuse_places, write_found
 from vibroimpact.analysis.dataset import dataset_file, open_dataset
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
-from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.operations.sensitivity import Sensitivity
 from vibroimpact.analysis.sensitivity import sensitivity_report
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 
-def show_sensitivity(
-    path: Path,
-    output: Path | None,
-    figure: Path | None,
-    of: Sequence[str],
-    level: float,
-    resamples: int,
-    seed: int,
-    force: bool,
-) -> None:
+def show_sensitivity(options: Sensitivity) -> None:
     """Estimate the Sobol indices of a campaign; print, write and draw them."""
-    file = dataset_file(path)
-    refuse_outputs([file], output, figure)
-    same = ("sensitivity", str(path))
-    refuse_overwriting(output, force, lambda there: (there.get("results_kind"), there.get("source")) == same)
+    path, file = options.file, dataset_file(options.file)
+    refuse_places(options, [file], results_kind="sensitivity", source=str(path))
     with open_dataset(file) as dataset:
         try:
-            found = sensitivity_report(dataset, of, level=level, resamples=resamples, seed=seed)
+            found = sensitivity_report(
+                *(dataset, options.of or ()),
+                level=options.level,
+                resamples=options.resamples,
+                seed=options.seed,
+            )
         except (DatasetError, UsageError) as problem:
             raise type(problem)(f"{file}: {problem}") from problem
     found = found.assign_attrs(source=str(path))
     _print(wide_terminal(), found)
-    if output is not None:
-        with writing(output):
-            write_results(found, output, kind="sensitivity")
-        Terminal().print(f"Dataset written to {output}.")
-    if figure is not None:
-        from vibroimpact.analysis import figures  # half a second, which a table needs not
-
-        drawn = figures.draw(found.assign_attrs(results_kind="sensitivity"))
-        with writing(figure):
-            figures.save(drawn, figure)
-        Terminal().print(f"Figure written to {figure}.")
+    write_found(found, "sensitivity", options)
 
 
 def _print(console: Terminal, found: xr.Dataset) -> None:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.commands.found import refuse_places
+from vibroimpact.analysis.dataset.outputs import writing
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.intervals import interval_report, print_intervals, seams
+from vibroimpact.analysis.operations.spikes import Spikes
 from vibroimpact.analysis.recording import EventTrain, Recording, open_signals
 from vibroimpact.analysis.recording.channels import Floats
 from vibroimpact.analysis.recording.rules import masked_spans
@@ -24,44 +25,22 @@ from vibroimpact.fmus.terminal import Terminal, wide_terminal
 _FEWEST_FOR_INTERVALS = 3
 
 
-@dataclass(frozen=True, slots=True)
-class IntervalOptions:
-    """What the command line says of the intervals between spikes; see `interval_report`."""
-
-    forcing_period: float | None
-    count_bin: float | None
-    seams: float | None
-    embedding: int
-    theiler: int
-
-
-def find_spikes(
-    data: Path,
-    output: Path | None,
-    figure: Path | None,
-    channel: str | None,
-    events: str | None,
-    run: int | None,
-    settings: SpikeSettings,
-    mechanics: Mechanics,
-    intervals: IntervalOptions,
-    force: bool,
-) -> None:
+def find_spikes(options: Spikes) -> None:
     """Find the spikes of a channel, or look at the intervals of an event train; print, write and draw them."""
-    refuse_outputs([data], output, figure)
-    same = ("spikes", data.name)
-    refuse_overwriting(output, force, lambda there: (there.get("results_kind"), there.get("source")) == same)
-    recording = open_signals(data, run)
+    data, output, figure = options.data, options.output, options.figure
+    settings, mechanics = _settings(options), _mechanics(options)
+    refuse_places(options, [data], results_kind="spikes", source=data.name)
+    recording = open_signals(data, options.run)
     console = wide_terminal()
     for remark in recording.remarks_counted:
         console.print(remark, style="yellow")
     report = None
     try:
-        if events is not None or not recording.channels:
-            train = recording.event_train(events)
-            dataset = _trains(console, train, intervals, masked_spans(train))
+        if options.events is not None or not recording.channels:
+            train = recording.event_train(options.events)
+            dataset = _trains(console, train, options, masked_spans(train))
         else:
-            report, dataset = _spikes(console, recording, channel, settings, mechanics, intervals)
+            report, dataset = _spikes(console, recording, options, settings, mechanics)
     except EstimationError as problem:
         raise EstimationError(f"{data}: {problem}") from problem
     dataset = dataset.assign_attrs(source=data.name)
@@ -73,6 +52,32 @@ def find_spikes(
         with writing(figure):
             _draw(report, dataset, figure)
         console.print(f"Figure written to {figure}.")
+
+
+def _settings(options: Spikes) -> SpikeSettings:
+    threshold = options.threshold
+    part = threshold is not None and threshold.strip().endswith("%")
+    return SpikeSettings(
+        method=options.method,
+        threshold=None if threshold is None or part else number(threshold, "--threshold"),
+        threshold_part=number(threshold.strip()[:-1], "--threshold") / 100.0 if threshold and part else None,
+        hysteresis=options.hysteresis,
+        minimum_samples=options.minimum_samples,
+        merge=options.merge,
+        polarity=options.polarity,
+        noise=options.noise,
+        false_alarms=options.false_alarms,
+        baseline_window=options.baseline,
+        rms_window=options.rms_window,
+        period=options.period,
+    )
+
+
+def _mechanics(options: Spikes) -> Mechanics:
+    impulses = numbers(options.known_impulses)
+    return Mechanics(
+        options.mass, options.restitution, options.sensitivity, impulses, waveform=options.waveform
+    )
 
 
 def number(text: str, option: str) -> float:
@@ -99,20 +104,19 @@ def numbers(text: str | None) -> Floats | None:
 def _spikes(
     console: Terminal,
     recording: Recording,
-    channel: str | None,
+    options: Spikes,
     settings: SpikeSettings,
     mechanics: Mechanics,
-    intervals: IntervalOptions,
 ) -> tuple[SpikeReport, xr.Dataset]:
     """Find and print the spikes of a channel, and their intervals where there are enough."""
-    report = spike_report(recording.channel(channel), settings, mechanics)
+    report = spike_report(recording.channel(options.channel), settings, mechanics)
     print_spikes(console, report)
     dataset = report.dataset
     if dataset.sizes["spike"] < _FEWEST_FOR_INTERVALS:
         return report, dataset
     # what was observed begins with the first spike: before it, one may have been cut off
     train = EventTrain("spikes", dataset["spike_time"].values)
-    more = _trains(console, train, intervals, unobserved(report))
+    more = _trains(console, train, options, unobserved(report))
     remarks = "\n".join(each.attrs["remarks"] for each in (dataset, more) if each.attrs.get("remarks"))
     merged = xr.merge([dataset, more], combine_attrs="drop_conflicts", join="outer", compat="override")
     return report, merged.assign_attrs(remarks=remarks)
@@ -121,7 +125,7 @@ def _spikes(
 def _trains(
     console: Terminal,
     train: EventTrain,
-    options: IntervalOptions,
+    options: Spikes,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> xr.Dataset:
     """Print and return what the intervals of a train tell."""

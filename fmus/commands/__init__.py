@@ -1,7 +1,1 @@
-"""The commands of this package: `options` declares them, `fmu` is what they do."""
-
-from __future__ import annotations
-
-from vibroimpact.fmus.commands.options import commands, register
-
-__all__ = ["commands", "register"]
+"""What the operations of this package do on the command line: `fmu` prints and checks components."""

@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.operations.fmu_build import BuildFmus
+from vibroimpact.fmus.operations.fmu_check import CheckFmus
+from vibroimpact.fmus.operations.fmu_list import ListFmus
 from vibroimpact.fmus.packaging.archive import platforms, unpack
 from vibroimpact.fmus.packaging.build import BUILT, build, read_components, update_readmes
 from vibroimpact.fmus.packaging.export import export_fmu
@@ -17,7 +20,7 @@ from vibroimpact.fmus.shipped import FOLDERS, component_name, components, fmu_pa
 from vibroimpact.fmus.terminal import note, say, wide_terminal
 
 
-def print_components() -> None:
+def print_components(_: ListFmus) -> None:
     """Show every component, its FMUs and what they run on."""
     rows = table("Components", "<component", "<FMI", ">variables", "<platforms", "<file")
     for component in read_components():
@@ -35,9 +38,9 @@ def _binaries(name: str, version: str) -> tuple[str, str]:
     return ", ".join(platforms(unpack(path))), str(path)
 
 
-def build_into(output: Path | None) -> None:
+def build_into(options: BuildFmus) -> None:
     """Compile all components for this machine, into a folder or into the package."""
-    output = output or BUILT
+    output = options.output or BUILT
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -49,7 +52,7 @@ def build_into(output: Path | None) -> None:
         say(str(path))
 
 
-def check_all(files: Sequence[Path], *, strict: bool = False) -> None:
+def check_all(options: CheckFmus) -> None:
     """Check FMUs, all of the package if none is named: refusals are raised, doubts and remarks are said.
 
     Raises
@@ -61,16 +64,16 @@ def check_all(files: Sequence[Path], *, strict: bool = False) -> None:
     from vibroimpact.fmus.packaging.check import check_fmu, kinds_of
     from vibroimpact.fmus.packaging.model_description import Grade
 
-    paths = files or [fmu_path(name, version) for name in components() for version in FOLDERS]
+    paths = options.files or [fmu_path(name, version) for name in components() for version in FOLDERS]
     found = [(path, finding) for path in paths for finding in check_fmu(path)]
-    refusing = (Grade.refused, Grade.doubt) if strict else (Grade.refused,)
+    refusing = (Grade.refused, Grade.doubt) if options.strict else (Grade.refused,)
     for path, finding in found:
         if finding.grade not in refusing:
             say(f"{path}: {finding.line()}")
     refused = [f"{path}: {finding.line()}" for path, finding in found if finding.grade in refusing]
     if refused:
         raise ComponentFileError("\n".join(refused))
-    for path in files:
+    for path in options.files or ():
         say(f"{path}: {kinds_of(path)}")
     counts = Counter(finding.grade for _, finding in found)
     doubts, remarks = counts[Grade.doubt], counts[Grade.remark]

@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
-
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.recording import write_recording
 from vibroimpact.analysis.recording.table import print_recording
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import wide_terminal
-from vibroimpact.hardware.recordings import import_recording, read_settings
+from vibroimpact.hardware.operations.import_files import ImportFiles
+from vibroimpact.hardware.recordings import ImportSettings, import_recording, read_settings
 from vibroimpact.hardware.recordings.settings import checked
 
 
-def import_into(
-    output: Path,
-    files: Sequence[Path],
-    options: Mapping[str, Any],
-    settings: Path | None,
-    figure: Path | None,
-    force: bool,
-) -> None:
-    """Import files as the options (keys of a settings file; None or empty: not given) and settings say."""
-    given = checked({key: value for key, value in options.items() if value not in (None, [])}, "command line")
-    common = None if settings is None else read_settings(settings)
-    refuse_outputs(files, output, figure)
-    recording = import_recording(files, given, common)
+def import_into(options: ImportFiles) -> None:
+    """Import files as the options and the settings say."""
+    output, figure = options.output, options.figure
+    given = _settings_of(options)
+    common = None if options.settings is None else read_settings(options.settings)
+    refuse_outputs(options.files, output, figure)
+    recording = import_recording(options.files, given, common)
     sources = recording.attrs.get("source_sha256")
-    refuse_overwriting(output, force, lambda there: there.get("source_sha256", "") == sources)
+    refuse_overwriting(output, options.force, lambda there: there.get("source_sha256", "") == sources)
     with writing(output):
         write_recording(recording, output)
     if figure is not None:
@@ -45,7 +36,18 @@ def import_into(
     console.print(f"Recording written to {output}.{drawn}", soft_wrap=True)
 
 
-def span(text: str, option: str) -> list[float]:
+def _settings_of(options: ImportFiles) -> ImportSettings:
+    """Return what the options say of the columns: they are the keys of a settings file; None or empty: not given."""
+    written = {key: getattr(options, key) for key in ImportSettings.model_fields}
+    if options.columns is not None:
+        written["columns"] = [part.strip() for part in options.columns.split(",")]
+    if options.window is not None:
+        written["window"] = _span(options.window, "window")
+    written["masked"] = [_span(text, "masked") for text in options.masked or ()]
+    return checked({key: value for key, value in written.items() if value not in (None, [])}, "command line")
+
+
+def _span(text: str, option: str) -> list[float]:
     """Return start and end of a span of time, s.
 
     Raises

@@ -3,32 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
+from vibroimpact.hardware.operations.rig_devices import ListDevices
+from vibroimpact.hardware.operations.rig_serve import ServeRig
 from vibroimpact.hardware.rig.opening import opened_rig
 from vibroimpact.hardware.virtual_rig.serving import served
 from vibroimpact.hardware.virtual_rig.settings import read_rig
 
 
-def serve_rig(file: Path, port: int, speed: float | None, lockstep: bool) -> None:
+def serve_rig(options: ServeRig) -> None:
     """Serve a virtual rig until Ctrl-C."""
-    settings = read_rig(file)
+    settings, speed = read_rig(options.file), options.speed
     if speed is not None and not 0.0 < speed <= 1000.0:
         raise UsageError(f"--speed: expected a number > 0 and <= 1000, got {speed:g}.")
-    with served(settings, port) as server:
-        server.board.set_pace(lockstep=lockstep, speed=speed)
-        pace = "in lockstep" if lockstep else f"{server.board.pace.speed:g} s of the rig in a second"
+    with served(settings, options.port) as server:
+        server.board.set_pace(lockstep=options.lockstep, speed=speed)
+        pace = "in lockstep" if options.lockstep else f"{server.board.pace.speed:g} s of the rig in a second"
         say(
             f"{settings.rig.name}, {server.board.profile.product}, at grpc://{server.address}, {pace}. Ctrl-C ends it."
         )
         server.wait()
 
 
-def list_devices(choice: str | None) -> None:
+def list_devices(options: ListDevices) -> None:
     """Print the devices of a rig."""
-    with opened_rig(choice) as rig:
+    with opened_rig(options.rig) as rig:
         found = list(rig.system().devices)
         for device in found:
             inputs, outputs = device.ai_physical_chans.channel_names, device.ao_physical_chans.channel_names

@@ -14,6 +14,8 @@ from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwrit
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import RigError, UsageError, VibroimpactError
 from vibroimpact.hardware import daqmx
+from vibroimpact.hardware.operations.rig_record import Record
+from vibroimpact.hardware.operations.rig_spikes import RecordSpikes
 from vibroimpact.hardware.programs.keeping import Store, keep_all, recording_in, write_and_show
 from vibroimpact.hardware.programs.pulses import PulseFinder
 from vibroimpact.hardware.rig.acquisition import Acquisition, Facts
@@ -166,9 +168,7 @@ def _refuse_many(measurement: Measurement, wanted: Wanted) -> None:
 
 
 def measure_into(
-    output: Path,
-    force: bool,
-    rig: str | None,
+    options: Record | RecordSpikes,
     wanted: Wanted,
     describe: Describe,
     *,
@@ -187,15 +187,16 @@ def measure_into(
     RigError
         The measurement ended early; what was measured until then is in the file.
     """
+    output = options.output
     refuse_outputs((), output, None)
-    refuse_overwriting(output, force, lambda there: False)
+    refuse_overwriting(output, options.force, lambda there: False)
     journal = output.with_suffix(ENDING)
     refuse_journal(journal)
     seconds = UNKNOWN_DURATION if wanted.duration is None else wanted.duration
     if in_pieces:
         seconds = min(seconds, UNKNOWN_DURATION)
     refuse_full_disk(output.parent, 8.0 * len(wanted.inputs) * wanted.rate * seconds)
-    recording = measured(rig, wanted, describe, most_pulses=most_pulses, journal=journal, live=True)
+    recording = measured(options.rig, wanted, describe, most_pulses=most_pulses, journal=journal, live=True)
     with stopped_by_signals(lambda: None):
         try:
             write_and_show(recording, output)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
 from vibroimpact.analysis.recording import Recording
+from vibroimpact.hardware.operations.rig_record import Record
 from vibroimpact.hardware.programs.measuring import Describe, Wanted, measure_into, measured, wanted_of
 from vibroimpact.hardware.rig.acquisition import Facts
 from vibroimpact.hardware.rig.measurement import Measurement, measurement_of
@@ -62,19 +62,12 @@ def record(
     return measured(rig, wanted, _describer(wanted), journal=journal)
 
 
-def record_channels(
-    rig: str | None,
-    channels: Sequence[str],
-    rate: float,
-    duration: float | None,
-    output: Path,
-    loopback: Sequence[str],
-    calibration: Sequence[Path],
-    force: bool,
-) -> None:
+def record_channels(options: Record) -> None:
     """Record inputs of a rig into a file."""
-    wanted = wanted_of(channels, loopback, calibration, rate, duration)
-    measure_into(output, force, rig, wanted, _describer(wanted))
+    wanted = wanted_of(
+        options.channel, options.loopback or (), options.calibration or (), options.rate, options.duration
+    )
+    measure_into(options, wanted, _describer(wanted))
 
 
 def _describer(wanted: Wanted) -> Describe:

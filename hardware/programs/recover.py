@@ -9,6 +9,7 @@ from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwrit
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.terminal import say
+from vibroimpact.hardware.operations.rig_recover import Recover
 from vibroimpact.hardware.programs.keeping import recording_in, write_and_show
 from vibroimpact.hardware.rig.journal import read_journal
 from vibroimpact.hardware.rig.measurement import FEWEST_SAMPLES
@@ -42,12 +43,13 @@ def recover(journal: str | os.PathLike[str]) -> Recording:
     return recording_in(content, str(journal))
 
 
-def recover_into(journal: Path, output: Path | None, force: bool) -> None:
+def recover_into(options: Recover) -> None:
     """Write the recording of a journal; the journal stays."""
+    journal = options.journal
     if not journal.name or journal.is_dir():
         raise UsageError(f"{journal}: expected a journal, got a folder.")
-    target = output or journal.with_suffix(".nc")
+    target = options.output or journal.with_suffix(".nc")
     refuse_outputs([journal], target, None)
-    refuse_overwriting(target, force, lambda there: False)
+    refuse_overwriting(target, options.force, lambda there: False)
     write_and_show(recover(journal), target)
     say(f"{journal} is still there; remove it when the recording has what you need.")

@@ -11,6 +11,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import Terminal, say
+from vibroimpact.hardware.operations.rig_sine import DriveSine
 from vibroimpact.hardware.rig.limits import Limits
 from vibroimpact.hardware.rig.opening import opened_rig
 from vibroimpact.hardware.rig.output import Output
@@ -104,6 +105,21 @@ def drive_sine(
             said(f"{terminal} is at 0 V." if output.has_driven else "Nothing was driven.")
             raise KeyboardInterrupt
     return output.generated / rate
+
+
+def drive_output(options: DriveSine) -> None:
+    """Drive an output with a sine, and show how far it is."""
+    drive_sine(
+        options.output,
+        options.frequency,
+        options.amplitude,
+        ramp=options.ramp,
+        duration=options.duration,
+        rate=options.rate,
+        most_amplitude=options.most_amplitude,
+        most_slew=options.most_slew,
+        rig=options.rig,
+    )
 
 
 def sine_of(frequency: float, amplitude: float, ramp: float, duration: float | None, rate: float) -> Sine:

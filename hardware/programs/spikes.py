@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.hardware.operations.rig_spikes import RecordSpikes
 from vibroimpact.hardware.programs.measuring import Describe, Wanted, measure_into, measured, wanted_of
 from vibroimpact.hardware.rig.acquisition import Facts
 from vibroimpact.hardware.rig.measurement import Measurement, PulseRule, measurement_of
@@ -18,61 +18,6 @@ from vibroimpact.hardware.rig.opening import Rig
 
 MOST_BESIDE = 10**6
 """Samples before or after a pulse, at most."""
-
-
-@dataclass(frozen=True, slots=True)
-class PulseOptions:
-    """What a pulse is, and what is kept of it.
-
-    Attributes
-    ----------
-    threshold : float
-        In the unit of the channel; negative: pulses below it.
-    on : str
-        The channel; empty: the first.
-    hysteresis : float
-        Part of the threshold below which a pulse is over.
-    presamples, postsamples : int
-        Samples of before and after a pulse.
-    dead_time : float
-        s from its start within which another passage of the threshold belongs to it.
-    most : int or None
-        Pulses after which it ends.
-    """
-
-    threshold: float
-    on: str = ""
-    hysteresis: float = 0.5
-    presamples: int = 64
-    postsamples: int = 64
-    dead_time: float = 0.0
-    most: int | None = None
-
-    def refuse(self, wanted: Wanted) -> None:
-        """Refuse what cannot be meant, all of it at once.
-
-        Raises
-        ------
-        UsageError
-        """
-        names = [each.name for each in wanted.inputs]
-        dead = self.dead_time * wanted.rate
-        rules = (
-            ("--threshold", "a finite number, not 0", self.threshold, 0.0 < abs(self.threshold) < np.inf),
-            ("--on", f"one of {', '.join(names)}", self.on, self.on in ("", *names)),
-            ("--hysteresis", "a part > 0 and <= 1", self.hysteresis, 0.0 < self.hysteresis <= 1.0),
-            ("--presamples", _beside(), self.presamples, 0 <= self.presamples <= MOST_BESIDE),
-            ("--postsamples", _beside(), self.postsamples, 0 <= self.postsamples <= MOST_BESIDE),
-            ("--dead-time", f"0 to {MOST_BESIDE:g} samples in s", self.dead_time, 0.0 <= dead <= MOST_BESIDE),
-            ("--pulses", "1 or more", self.most, self.most is None or self.most >= 1),
-        )
-        problems = [f"{name}: expected {rule}, got {got}." for name, rule, got, holds in rules if not holds]
-        if problems:
-            raise UsageError("\n".join(problems))
-
-
-def _beside() -> str:
-    return f"0 to {MOST_BESIDE:g} samples"
 
 
 def record_spikes(
@@ -121,28 +66,31 @@ def record_spikes(
         As of `record`; also where there is no pulse.
     """
     wanted = wanted_of(channels, (), calibration, rate, duration)
-    options = PulseOptions(threshold, on, hysteresis, presamples, postsamples, dead_time, pulses)
+    options = RecordSpikes(
+        output=Path(),  # nothing is written but the journal
+        channel=list(channels),
+        rate=rate,
+        duration=duration,
+        threshold=threshold,
+        on=on,
+        hysteresis=hysteresis,
+        presamples=presamples,
+        postsamples=postsamples,
+        dead_time=dead_time,
+        pulses=pulses,
+    )
     return measured(rig, wanted, _describer(wanted, options), most_pulses=pulses, journal=journal)
 
 
-def record_pulses(
-    rig: str | None,
-    channels: Sequence[str],
-    rate: float,
-    duration: float | None,
-    options: PulseOptions,
-    output: Path,
-    calibration: Sequence[Path],
-    force: bool,
-) -> None:
+def record_pulses(options: RecordSpikes) -> None:
     """Record pulses into a file."""
-    wanted = wanted_of(channels, (), calibration, rate, duration)
+    wanted = wanted_of(options.channel, (), options.calibration or (), options.rate, options.duration)
     describe = _describer(wanted, options)
-    measure_into(output, force, rig, wanted, describe, in_pieces=True, most_pulses=options.most)
+    measure_into(options, wanted, describe, in_pieces=True, most_pulses=options.pulses)
 
 
-def _describer(wanted: Wanted, options: PulseOptions) -> Describe:
-    options.refuse(wanted)
+def _describer(wanted: Wanted, options: RecordSpikes) -> Describe:
+    _refuse_wrong(options, [each.name for each in wanted.inputs])
 
     def describe(rig: Rig, facts: Facts) -> Measurement:
         rule = PulseRule(
@@ -156,3 +104,29 @@ def _describer(wanted: Wanted, options: PulseOptions) -> Describe:
         return measurement_of("spikes", rig, facts, wanted.inputs, wanted.calibrations, pulses=rule)
 
     return describe
+
+
+def _refuse_wrong(options: RecordSpikes, names: Sequence[str]) -> None:
+    """Refuse what cannot be meant of pulses on channels of these names, all of it at once.
+
+    Raises
+    ------
+    UsageError
+    """
+    dead = options.dead_time * options.rate
+    rules = (
+        ("--threshold", "a finite number, not 0", options.threshold, 0.0 < abs(options.threshold) < np.inf),
+        ("--on", f"one of {', '.join(names)}", options.on, options.on in ("", *names)),
+        ("--hysteresis", "a part > 0 and <= 1", options.hysteresis, 0.0 < options.hysteresis <= 1.0),
+        ("--presamples", _beside(), options.presamples, 0 <= options.presamples <= MOST_BESIDE),
+        ("--postsamples", _beside(), options.postsamples, 0 <= options.postsamples <= MOST_BESIDE),
+        ("--dead-time", f"0 to {MOST_BESIDE:g} samples in s", options.dead_time, 0.0 <= dead <= MOST_BESIDE),
+        ("--pulses", "1 or more", options.pulses, options.pulses is None or options.pulses >= 1),
+    )
+    problems = [f"{name}: expected {rule}, got {got}." for name, rule, got, holds in rules if not holds]
+    if problems:
+        raise UsageError("\n".join(problems))
+
+
+def _beside() -> str:
+    return f"0 to {MOST_BESIDE:g} samples"

@@ -11,8 +11,8 @@ from pathlib import Path
 from rich.live import Live
 from rich.table import Table
 
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
-from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.commands.found import refuse_places, write_found
+from vibroimpact.analysis.dataset.outputs import refuse_outputs
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
@@ -20,6 +20,7 @@ from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.preparing import with_modes
+from vibroimpact.orchestrator.operations.accuracy import Accuracy
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.accuracy.choice import advice, error_of_reference, refuse_unreached
@@ -31,17 +32,7 @@ WIDE = 120
 """Letters in a line of a terminal from which on the table has all columns; the dataset has them in any case."""
 
 
-def study_scene(
-    path: Path,
-    changes: Sequence[str],
-    output: Path | None,
-    figure: Path | None,
-    tolerance: float | None,
-    quantity: str,
-    write: Path | None,
-    budget: float,
-    force: bool,
-) -> None:
+def study_scene(options: Accuracy) -> None:
     """Study a scene, print a table and what to choose, and write what was asked for.
 
     Raises
@@ -49,33 +40,23 @@ def study_scene(
     UsageError
         Before anything runs, where the arguments alone show it.
     """
-    refuse_misuse(tolerance, quantity, budget)
+    tolerance, quantity, path, write = options.tolerance, options.of, options.scene, options.write
+    refuse_misuse(tolerance, quantity, options.budget)
     if write is not None and tolerance is None:
         raise UsageError(
             f"{option('write')}: expected a tolerance to tune for, got none. Add {option('tolerance')} 1e-6."
         )
-    opened = opened_scene(path, changes)
-    refuse_outputs([path, *opened.files], output, figure)
+    opened = opened_scene(path, options.changes or ())
     if write is not None:
         refuse_outputs([path], write, ending=".toml")
-    refuse_overwriting(
-        output,
-        force,
-        lambda there: (there.get("results_kind"), there.get("scene_file")) == ("accuracy", str(path)),
-    )
+    refuse_places(options, [path, *opened.files], results_kind="accuracy", scene_file=str(path))
     scene = with_modes(opened)
     with _shown(scene.title or scene.source, quantity) as told:
-        study = study_accuracy(scene, tolerance=tolerance, quantity=quantity, budget=budget, told=told)
+        study = study_accuracy(
+            scene, tolerance=tolerance, quantity=quantity, budget=options.budget, told=told
+        )
     _print(study)
-    dataset = dataset_of(study).assign_attrs(scene_file=str(path))
-    if output is not None:
-        write_results(dataset, output, kind="accuracy")
-        say(f"Dataset written to {output}.")
-    if figure is not None:
-        from vibroimpact.analysis import figures  # half a second, which a table needs not
-
-        figures.save(figures.draw(dataset.assign_attrs(results_kind="accuracy")), figure)
-        say(f"Figure written to {figure}.")
+    write_found(dataset_of(study).assign_attrs(scene_file=str(path)), "accuracy", options)
     refuse_unreached(study)
     if write is not None:
         _write_tuned(scene.text, study, write)

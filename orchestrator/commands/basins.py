@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import numpy as np
 import typer
 import xarray as xr
 
+from vibroimpact.analysis.commands.found import write_found
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
-from vibroimpact.analysis.orbits.basins import Basins
+from vibroimpact.analysis.orbits.basins import Basins as Found
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
-from vibroimpact.orchestrator.commands.energies import write_found
+from vibroimpact.orchestrator.operations.basins import Basins
 from vibroimpact.orchestrator.orbits.basins import (
     HISTORY,
     Plane,
@@ -66,9 +64,7 @@ def points_of(text: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[-1])
 
 
-def show_basins(
-    path: Path, plane: Plane, changes: Sequence[str], output: Path | None, figure: Path | None, force: bool
-) -> None:
+def show_basins(options: Basins) -> None:
     """Find where the starts of a plane end; print, write and draw it.
 
     Raises
@@ -78,14 +74,15 @@ def show_basins(
     typer.Exit
         Ctrl-C came, and what is known is printed and written.
     """
-    refuse_outputs([path], output, figure)
-    scene = opened_scene(path, changes)
-    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
+    plane = Plane(span_of(options.x, "x"), span_of(options.y, "y"), points_of(options.points), options.number)
+    refuse_outputs([options.scene], options.output, options.figure)
+    scene = opened_scene(options.scene, options.changes or ())
+    refuse_overwriting(options.output, options.force, lambda there: there.get("history") == HISTORY)
     alone, x, y, found = prepare_basins(scene, plane)
     interrupted = False
     with Terminal(stderr=True).status("Looking for attractors") as status:
 
-        def told(now: Basins) -> None:
+        def told(now: Found) -> None:
             names = ", ".join(now.names) or "none yet"
             status.update(f"{100.0 * now.decided:.1f} % of {now.possible} starts; {names}")
 
@@ -108,13 +105,13 @@ def show_basins(
         )
     wide_terminal().print(rows)
     _say_rest(found, data)
-    write_found(data.assign_attrs(scene_file=str(path)), "basins", output, figure)
+    write_found(data.assign_attrs(scene_file=str(options.scene)), "basins", options)
     if interrupted:
         say("Interrupted: the above is what is known so far.", err=True)
         raise typer.Exit(130)
 
 
-def _say_rest(found: Basins, data: xr.Dataset) -> None:
+def _say_rest(found: Found, data: xr.Dataset) -> None:
     undecided = 1.0 - found.decided
     if undecided > 0.0:
         say(f"{100.0 * undecided:.3g} % of the starts came near to no attractor that is known.")
@@ -133,7 +130,7 @@ def _say_rest(found: Basins, data: xr.Dataset) -> None:
         say(f"{100.0 * share:.3g} % lie on a border.")
 
 
-def _say_chaotic(found: Basins) -> None:
+def _say_chaotic(found: Found) -> None:
     """Print what tells chaotic attractors apart, or that they are not told apart."""
     chaotic = [
         (name, each) for name, each in zip(found.names, found.attractors, strict=True) if each.is_chaotic

@@ -1,11 +1,10 @@
-"""Which orbit a command begins with: as options say it."""
+"""Which orbit an operation begins with."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -22,91 +21,97 @@ class Begun(NamedTuple):
     seed: Seed | None
 
 
-@dataclass(frozen=True, slots=True)
-class Beginning:
-    """Options that say which orbit is meant."""
-
-    impacts: int | None = None
-    periods: int | None = None
-    seed: str | None = None
-    dataset: Path | None = None
-    run: int | None = None
+class Beginning(Protocol):
+    """Arguments that say which orbit is meant."""
 
     @property
-    def is_seed(self) -> bool:
-        """Whether it is one orbit, near to impacts that are given."""
-        return self.seed is not None or self.dataset is not None
+    def impacts(self) -> int | None:
+        """Impacts of it."""
 
     @property
-    def files(self) -> list[Path]:
-        """That are read."""
-        return [] if self.dataset is None else [self.dataset]
+    def periods(self) -> int | None:
+        """Forcing periods of it."""
 
-    def refuse(self) -> None:
-        """Refuse options that say two things, or half of one.
+    @property
+    def seed(self) -> str | None:
+        """Phases and stops of impacts near to those of one orbit."""
 
-        Raises
-        ------
-        UsageError
-        """
-        if self.dataset is None and self.run is not None:
-            raise UsageError("--run: expected --from-dataset as well, got --run alone.")
-        given = [
-            name
-            for name, value in (
-                ("--impacts", self.impacts),
-                ("--periods", self.periods),
-                ("--seed", self.seed),
-            )
-            if value is not None
-        ]
-        if self.dataset is not None and given:
-            raise UsageError(f"--from-dataset: expected it without {', '.join(given)}, which the run says.")
+    @property
+    def from_dataset(self) -> Path | None:
+        """Dataset of a run that is on it."""
 
-    def begun(self, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()) -> Begun:
-        """Return the scene at the values of the run of the dataset, if there is one, and the seed.
+    @property
+    def run(self) -> int | None:
+        """Index of that run."""
 
-        Parameters
-        ----------
-        scene : Scene
-            Its sweep is left out.
-        changes : sequence of str
-            Which it was given, each KEY=VALUE.
-        varied : sequence of str
-            Keys that the command varies: values that the scene leaves to its sweep are not needed.
 
-        Raises
-        ------
-        UsageError
-            The seed is none, or a change is another than the run has.
-        DatasetError
-            The run has no orbit.
-        """
-        if self.dataset is None:
-            return Begun(scene.unswept(varied), self.impacts, self.periods, self._impacts_of_seed())
-        with open_dataset(self.dataset) as runs:
-            try:
-                found = seed_of_run(runs, self.run)
-            except (DatasetError, UsageError) as problem:
-                raise type(problem)(f"{self.dataset}: {problem}") from problem
-        if twice := sorted(found.values.keys() & {each.partition("=")[0].strip() for each in changes}):
+def is_seed(options: Beginning) -> bool:
+    """Tell whether one orbit is meant, near to impacts that are given."""
+    return options.seed is not None or options.from_dataset is not None
+
+
+def files_of(options: Beginning) -> list[Path]:
+    """Return the files that are read for it."""
+    return [] if options.from_dataset is None else [options.from_dataset]
+
+
+def refuse_contradictions(options: Beginning) -> None:
+    """Refuse options that say two things, or half of one.
+
+    Raises
+    ------
+    UsageError
+    """
+    if options.from_dataset is None and options.run is not None:
+        raise UsageError("--run: expected --from-dataset as well, got --run alone.")
+    given = [f"--{name}" for name in ("impacts", "periods", "seed") if getattr(options, name) is not None]
+    if options.from_dataset is not None and given:
+        raise UsageError(f"--from-dataset: expected it without {', '.join(given)}, which the run says.")
+
+
+def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()) -> Begun:
+    """Return the scene at the values of the run of the dataset, if there is one, and the seed.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its sweep is left out.
+    changes : sequence of str
+        Which it was given, each KEY=VALUE.
+    varied : sequence of str
+        Keys that the command varies: values that the scene leaves to its sweep are not needed.
+
+    Raises
+    ------
+    UsageError
+        The seed is none, or a change is another than the run has.
+    DatasetError
+        The run has no orbit.
+    """
+    if options.from_dataset is None:
+        return Begun(scene.unswept(varied), options.impacts, options.periods, _impacts_of(options.seed))
+    with open_dataset(options.from_dataset) as runs:
+        try:
+            found = seed_of_run(runs, options.run)
+        except (DatasetError, UsageError) as problem:
+            raise type(problem)(f"{options.from_dataset}: {problem}") from problem
+    if twice := sorted(found.values.keys() & {each.partition("=")[0].strip() for each in changes}):
+        raise UsageError(f"--set {twice[0]}: expected another key than those the dataset sweeps, got one.")
+    alone = scene.unswept([*varied, *found.values])
+    return Begun(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
+
+
+def _impacts_of(seed: str | None) -> Seed | None:
+    if seed is None:
+        return None
+    found = []
+    for each in seed.split(","):
+        phase, _, stop = each.partition(":")
+        try:
+            found.append((float(phase), int(stop or "1")))
+        except ValueError:
             raise UsageError(
-                f"--set {twice[0]}: expected another key than those the dataset sweeps, got one."
-            )
-        alone = scene.unswept([*varied, *found.values])
-        return Begun(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
-
-    def _impacts_of_seed(self) -> Seed | None:
-        if self.seed is None:
-            return None
-        found = []
-        for each in self.seed.split(","):
-            phase, _, stop = each.partition(":")
-            try:
-                found.append((float(phase), int(stop or "1")))
-            except ValueError:
-                raise UsageError(
-                    f"--seed: expected phases in rad, each with :STOP where it is not 1, got {self.seed!r}. "
-                    'For example "0.5:1,3.6:2".'
-                ) from None
-        return found
+                f"--seed: expected phases in rad, each with :STOP where it is not 1, got {seed!r}. "
+                'For example "0.5:1,3.6:2".'
+            ) from None
+    return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import typer
@@ -14,25 +13,18 @@ from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_worker
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
 from vibroimpact.orchestrator.commands.preparing import prepared
+from vibroimpact.orchestrator.operations.campaign import Campaign
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
 
 
-def run_to_folder(
-    scene: Path,
-    output: Path,
-    changes: Sequence[str],
-    workers: int | None,
-    scheduler: str | None,
-    *,
-    strict: bool = False,
-) -> None:
+def run_to_folder(options: Campaign) -> None:
     """Run a scene's sweep into the folder of a campaign and say what was done."""
-    refuse_two_kinds_of_workers(workers, scheduler)
-    refuse_system_elsewhere(scene, scheduler)
-    loaded = opened_scene(scene, changes, strict=strict)
-    refuse_folder(output)
-    compute(prepared(loaded), output, workers, scheduler)
+    refuse_two_kinds_of_workers(options.workers, options.scheduler)
+    refuse_system_elsewhere(options.scene, options.scheduler)
+    loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)
+    refuse_folder(options.output)
+    compute(prepared(loaded), options.output, options.workers, options.scheduler)
 
 
 def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:

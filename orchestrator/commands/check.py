@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
 import typer
 
@@ -21,6 +20,7 @@ from vibroimpact.orchestrator.campaign.check import (
 from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED, counted
 from vibroimpact.orchestrator.commands.preparing import with_modes
+from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.summary import contacts, effects, engine, laws
@@ -36,7 +36,7 @@ _DURATIONS = (
 )
 
 
-def check_scene(path: Path, changes: Sequence[str], *, strict: bool = False) -> None:
+def check_scene(options: Check) -> None:
     """Load a scene, compute one point of it, and print what would run and what it would cost.
 
     Raises
@@ -46,8 +46,8 @@ def check_scene(path: Path, changes: Sequence[str], *, strict: bool = False) -> 
     typer.Exit
         The point failed.
     """
-    scene = with_modes(opened_scene(path, changes, strict=strict))
-    say(f"{path}: no problems")
+    scene = with_modes(opened_scene(options.scene, options.changes or (), strict=options.strict))
+    say(f"{options.scene}: no problems")
     _say_aligned(_what_runs(scene))
     cost = cost_of(scene)
     _say_aligned(_what_it_costs(scene, cost))

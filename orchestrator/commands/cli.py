@@ -1,7 +1,7 @@
-"""The command `vibroimpact`: one app; every package adds its commands through an entry point.
+"""The command `vibroimpact`: one app; `table` names the commands, and another package can add its own.
 
-A command is a function in the entry-point group `vibroimpact.commands` that is called with the app. So this
-module imports nothing above it, and another package can add commands of its own.
+A function in the entry-point group `vibroimpact.commands` is called with the app where no command of this package is
+called.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import copy
 import errno
 import functools
 import gc
-import inspect
 import logging
 import os
 import signal
@@ -21,7 +20,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import metadata
 from itertools import takewhile
@@ -30,44 +29,16 @@ from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
-from typer.models import CommandInfo
 
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.printable import printable
 from vibroimpact.fmus.terminal import all_was_written, say
 from vibroimpact.fmus.wording import command_line
+from vibroimpact.orchestrator.commands.table import COMMANDS, GROUPS, PANELS
+from vibroimpact.orchestrator.commands.typer_form import add_commands
 
 COMMAND_GROUP = "vibroimpact.commands"
-PANELS = {
-    "Simulate": ("check", "run", "campaign", "demo"),
-    "Look": ("plot", "describe"),
-    "Measure and compare": (
-        "accuracy",
-        "effects",
-        "sensitivity",
-        "hard-cases",
-        "import",
-        "replay",
-        "estimate",
-        "spikes",
-    ),
-    "Orbits": (
-        "orbit",
-        "follow",
-        "maps",
-        "classify",
-        "lyapunov",
-        "energies",
-        "resonances",
-        "basins",
-        "control",
-    ),
-    "Exchange": ("fmu", "ssp"),
-    "Rigs": ("rig",),
-    "Serve": ("serve", "submit", "status", "fetch", "cancel"),
-}
-"""The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""
 DEBUG = "--debug"
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _FEW_DESCRIPTORS = frozenset({errno.EMFILE, errno.ENFILE})
@@ -100,12 +71,9 @@ class _Commands(TyperGroup):
             return super().invoke(ctx)
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the commands; each is given its panel."""
-        commands: Mapping[str, Any] = self.commands
-        panel_of = {name: panel for panel, names in PANELS.items() for name in names}
-        for name in panel_of.keys() & commands.keys():
-            commands[name].rich_help_panel = panel_of[name]
-        return sorted(commands, key=[*panel_of, *commands].index)
+        """Return the names of the commands in the order of their panels; those of other packages come last."""
+        shown = [name for names in PANELS.values() for name in names]
+        return sorted(self.commands, key=[*shown, *self.commands].index)
 
 
 app = typer.Typer(
@@ -136,46 +104,30 @@ def _options(
 
 @functools.cache
 def load_commands() -> None:
-    """Let every installed package add its commands, once in a process."""
+    """Add every command to the app, once in a process: those of this package, then those of others."""
+    add_commands(app)
+    _add_foreign(app)
+
+
+def _add_foreign(app: typer.Typer) -> None:
     for entry in sorted(metadata.entry_points(group=COMMAND_GROUP), key=lambda entry: entry.name):
         entry.load()(app)
 
 
 def _with_called(words: Sequence[str]) -> typer.Typer:
-    """Return the app with the command, or group of commands, that is called.
-
-    Typer builds a command in 2 ms, and there are fifty. Where none is called their descriptions are enough; where none
-    has the name that is called, all of them are there to suggest one.
-    """
-    called = next((word for word in words if not word.startswith("-")), None)
-    if called is None:
-        return _described(app)
-    chosen = copy.copy(app)
-    chosen.registered_commands = [one for one in app.registered_commands if _name_of(one) == called]
-    chosen.registered_groups = [one for one in app.registered_groups if one.name == called]
-    return chosen if chosen.registered_commands or chosen.registered_groups else app
-
-
-def _name_of(command: CommandInfo) -> str:
-    return command.name or typer.main.get_command_name(getattr(command.callback, "__name__", ""))
-
-
-def _described(app: typer.Typer) -> typer.Typer:
-    """Return an app whose commands have names and descriptions alone."""
-    shown = copy.copy(app)
-    shown.registered_commands = [copy.copy(one) for one in app.registered_commands]
-    for command in shown.registered_commands:
-        command.name = _name_of(command)
-        command.help = command.help or inspect.getdoc(command.callback)
-        command.callback = _no_command
-    shown.registered_groups = [copy.copy(one) for one in app.registered_groups]
-    for group in shown.registered_groups:
-        group.typer_instance = group.typer_instance and _described(group.typer_instance)
-    return shown
-
-
-def _no_command() -> None:
-    """Stand for a command that is not called."""
+    """Return an app with the command that is called; where it is none of this package, with all there are."""
+    named = [word for word in words if not word.startswith("-")]
+    called = copy.copy(app)
+    if named and named[0] in COMMANDS.keys() | GROUPS.keys():
+        called.registered_commands, called.registered_groups = [], []
+    else:
+        called.registered_commands, called.registered_groups = (
+            app.registered_commands[:],
+            app.registered_groups[:],
+        )
+        _add_foreign(called)
+    add_commands(called, named)
+    return called
 
 
 @contextmanager
@@ -263,7 +215,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for word in given:
             refuse_no_text(word)
         with _no_interrupt_is_lost(), _no_vain_collections(), _no_library_warns(), command_line():
-            load_commands()
             # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
             typer.main.get_command(_with_called(given)).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:

@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import typer
 
+from vibroimpact.analysis.commands.found import write_found
 from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, refuse_overwriting
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.packaging.python_fmus import require_pythonfmu
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
-from vibroimpact.orchestrator.commands.energies import write_found
 from vibroimpact.orchestrator.commands.failures import counted
+from vibroimpact.orchestrator.operations.control import Control
 from vibroimpact.orchestrator.orbits.control import HISTORY, Controlled, run_plan
 from vibroimpact.orchestrator.orbits.control_parts import coupled_scene
-from vibroimpact.orchestrator.orbits.control_plan import ControlPlan, ControlSettings, control_plan
+from vibroimpact.orchestrator.orbits.control_plan import (
+    ControlPlan,
+    ControlSettings,
+    control_plan,
+    settings_of,
+)
 from vibroimpact.orchestrator.ssp import opened_scene
 
 _SHOWN = 8
 """Frequencies that are told."""
 
 
-def show_control(
-    path: Path,
-    span: tuple[float, float],
-    settings: ControlSettings,
-    changes: Sequence[str],
-    output: Path | None,
-    figure: Path | None,
-    keep: Path | None,
-    force: bool,
-) -> None:
+def show_control(options: Control) -> None:
     """Keep an orbit; print, write and draw how far that went.
 
     Raises
@@ -43,17 +39,18 @@ def show_control(
     typer.Exit
         Ctrl-C came; likewise.
     """
+    settings, keep = _settings(options), options.keep
     require_pythonfmu()
-    refuse_outputs([path], output, figure)
+    refuse_outputs([options.scene], options.output, options.figure)
     if keep is not None:
         refuse_folder(keep)
         if keep.exists():
             raise UsageError(f"{keep}: expected a new folder, got one that is there.")
-    scene = opened_scene(path, changes)
-    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
+    scene = opened_scene(options.scene, options.changes or ())
+    refuse_overwriting(options.output, options.force, lambda there: there.get("history") == HISTORY)
     interrupted, failure = False, None
     with Terminal(stderr=True).status("Looking for the orbits") as status:
-        plan = control_plan(scene, *span, settings)
+        plan = control_plan(scene, options.start, options.stop, settings)
         if keep is not None:
             _keep(plan, keep)
         found = Controlled(plan)
@@ -69,12 +66,25 @@ def show_control(
             failure = problem
     if found.impacts:
         _print(found)
-        write_found(found.dataset.assign_attrs(scene_file=str(path)), "control", output, figure)
+        write_found(found.dataset.assign_attrs(scene_file=str(options.scene)), "control", options)
     if failure is not None:
         raise failure
     if interrupted:
         say("Interrupted: the above is what was kept so far.", err=True)
         raise typer.Exit(130)
+
+
+def _settings(options: Control) -> ControlSettings:
+    return settings_of(
+        law=options.law,
+        step=options.step,
+        tolerance=options.tolerance,
+        limit=options.limit,
+        noise=options.noise,
+        seed=options.seed,
+        periods=options.periods,
+        stay=options.stay,
+    )
 
 
 def _keep(plan: ControlPlan, folder: Path) -> None:

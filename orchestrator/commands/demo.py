@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from importlib import resources
-from pathlib import Path
 
 from rich.table import Table
 
@@ -16,6 +15,7 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.orchestrator.campaign import CampaignReport
 from vibroimpact.orchestrator.commands.campaign import computed
+from vibroimpact.orchestrator.operations.demo import Demo
 from vibroimpact.orchestrator.scene import Scene, load_scene
 
 SCENE = "demo_scene.toml"
@@ -23,7 +23,7 @@ STEPS_ALLOWED = 2.0
 """How far a reading may lie from the exact value, in steps of the sweep."""
 
 
-def run_demo(output: Path) -> None:
+def run_demo(options: Demo) -> None:
     """Run the packaged bifurcation scene into a folder, draw its figure there, and say what was done and read.
 
     Raises
@@ -33,7 +33,7 @@ def run_demo(output: Path) -> None:
     typer.Exit
         The campaign was interrupted.
     """
-    console = Terminal(soft_wrap=True)
+    console, output = Terminal(soft_wrap=True), options.output
     began = time.perf_counter()
     with resources.as_file(resources.files("vibroimpact.orchestrator.commands") / SCENE) as path:
         scene = load_scene(path)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
-from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.commands.found import refuse_places, write_found
 from vibroimpact.analysis.dataset.schema import UnitSystem, unit_in
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.fmus.units import written_unit
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.preparing import with_modes
+from vibroimpact.orchestrator.operations.effects import Effects
 from vibroimpact.orchestrator.scene.summary import engine
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.effects import Share, dataset_of_shares, effects_of, not_called, shares_of
@@ -28,17 +27,11 @@ from vibroimpact.orchestrator.study.motion import (
 )
 
 
-def show_effects(
-    path: Path, changes: Sequence[str], output: Path | None, figure: Path | None, force: bool
-) -> None:
+def show_effects(options: Effects) -> None:
     """Measure the effects of a scene, print them, and write what was asked for."""
-    opened = opened_scene(path, changes)
-    refuse_outputs([path, *opened.files], output, figure)
-    refuse_overwriting(
-        output,
-        force,
-        lambda there: (there.get("results_kind"), there.get("scene_file")) == ("effects", str(path)),
-    )
+    path = options.scene
+    opened = opened_scene(path, options.changes or ())
+    refuse_places(options, [path, *opened.files], results_kind="effects", scene_file=str(path))
     scene = with_modes(opened)
     alone = scene.unswept()
     say(f"{engine(alone)}")
@@ -55,14 +48,7 @@ def show_effects(
         say(f"A run takes {duration(float(np.nanmedian([share.full for share in shares])))}; shares overlap.")
     say(f"Not asked for, and not simulated: {', '.join(not_called(scene)) or 'nothing'}.")
     dataset = dataset_of_shares(alone, shares, {**scene.found, "scene_file": str(path)})
-    if output is not None:
-        write_results(dataset, output, kind="effects")
-        say(f"Dataset written to {output}.")
-    if figure is not None:
-        from vibroimpact.analysis import figures  # half a second, which a table needs not
-
-        figures.save(figures.draw(dataset.assign_attrs(results_kind="effects")), figure)
-        say(f"Figure written to {figure}.")
+    write_found(dataset, "effects", options)
 
 
 def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:

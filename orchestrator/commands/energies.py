@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.commands.found import refuse_places, write_found
 from vibroimpact.analysis.dataset import dataset_file, open_dataset
-from vibroimpact.analysis.dataset.outputs import DATASET_ENDING, refuse_outputs, refuse_overwriting, writing
-from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.dataset.outputs import DATASET_ENDING
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.orbits.energies import residual_restitution
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -21,6 +21,7 @@ from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.preparing import with_modes
+from vibroimpact.orchestrator.operations.energies import Energies
 from vibroimpact.orchestrator.orbits import impacting_body
 from vibroimpact.orchestrator.orbits.energies import energies
 from vibroimpact.orchestrator.ssp import opened_scene
@@ -29,18 +30,13 @@ _MOST_SHOWN = 4
 """Modes up to which the matrices of an impact are printed."""
 
 
-def show_energies(
-    path: Path, output: Path | None, figure: Path | None, run: int | None, changes: Sequence[str], force: bool
-) -> None:
+def show_energies(options: Energies) -> None:
     """Find the energies of the modes of a scene or a dataset; print, write and draw them."""
-    refuse_outputs([dataset_file(path)], output, figure)
-    same = ("energies", str(path))
-    refuse_overwriting(
-        output, force, lambda there: (there.get("results_kind"), there.get("scene_file")) == same
-    )
-    with runs_of(path, changes) as dataset, shown_progress() as progress:
+    path = options.file
+    refuse_places(options, [dataset_file(path)], results_kind="energies", scene_file=str(path))
+    with runs_of(path, options.changes or ()) as dataset, shown_progress() as progress:
         try:
-            found = energies(dataset, run, progress=progress)
+            found = energies(dataset, options.run, progress=progress)
         except (DatasetError, UsageError) as problem:
             raise type(problem)(f"{path}: {problem}") from problem
     found = found.assign_attrs(scene_file=str(path))
@@ -48,22 +44,7 @@ def show_energies(
         _print_one(found)
     else:
         _print_all(found)
-    write_found(found, "energies", output, figure)
-
-
-def write_found(found: xr.Dataset, kind: str, output: Path | None, figure: Path | None) -> None:
-    """Write and draw what was found, where that is asked for."""
-    if output is not None:
-        with writing(output):
-            write_results(found, output, kind=kind)
-        say(f"Dataset written to {output}.")
-    if figure is not None:
-        from vibroimpact.analysis import figures  # half a second, which a table needs not
-
-        drawn = figures.draw(found.assign_attrs(results_kind=kind))
-        with writing(figure):
-            figures.save(drawn, figure)
-        say(f"Figure written to {figure}.")
+    write_found(found, "energies", options)
 
 
 @contextmanager

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,9 +16,10 @@ from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, Bran
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
-from vibroimpact.orchestrator.commands.beginning import Beginning, Begun
+from vibroimpact.orchestrator.commands.beginning import Begun, begun, files_of, refuse_contradictions
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.commands.orbit import multiplier_text
+from vibroimpact.orchestrator.operations.follow import Follow
 from vibroimpact.orchestrator.orbits.follow import (
     HISTORY,
     Followed,
@@ -34,38 +34,28 @@ EXACT_DIGITS, UNEXPLAINED_DIGITS = 11, 6
 """Digits of the value of a special point: of one that is a zero of a test, and of one that only a bracket holds."""
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What is followed: options of the command."""
+def _second_range(options: Follow) -> tuple[float, float] | None:
+    """Return the range of the second number.
 
-    parameter: str
-    span: tuple[float, float]
-    beginning: Beginning
-    doublings: int
-    step: float
-    second: str | None
-    second_span: tuple[float | None, float | None]
-
-    def refuse(self) -> None:
-        """Refuse half a second range, and half a beginning.
-
-        Raises
-        ------
-        UsageError
-        """
-        self.beginning.refuse()
-        given = (self.second is not None, *(end is not None for end in self.second_span))
-        if any(given) and not all(given):
-            raise UsageError(
-                "--second: expected --second, --second-from and --second-to together, got some of them."
-            )
-        if all(given) and self.second_span[0] == self.second_span[1]:
-            raise UsageError("--second-from, --second-to: expected two different numbers, got the same.")
+    Raises
+    ------
+    UsageError
+        It is half given, or empty.
+    """
+    low, high = options.second_start, options.second_stop
+    given = (options.second is not None, low is not None, high is not None)
+    if any(given) and not all(given):
+        raise UsageError(
+            "--second: expected --second, --second-from and --second-to together, got some of them."
+        )
+    if low is None or high is None:
+        return None
+    if low == high:
+        raise UsageError("--second-from, --second-to: expected two different numbers, got the same.")
+    return min(low, high), max(low, high)
 
 
-def show_branches(
-    path: Path, wanted: Wanted, changes: Sequence[str], output: Path | None, figure: Path | None, force: bool
-) -> None:
+def show_branches(options: Follow) -> None:
     """Follow branches, print their special points, and write what was asked for.
 
     Raises
@@ -75,16 +65,20 @@ def show_branches(
     typer.Exit
         Ctrl-C came; likewise.
     """
-    wanted.refuse()
-    refuse_outputs([path, *wanted.beginning.files], output, figure)
-    begun = wanted.beginning.begun(opened_scene(path, changes, for_orbits=True), changes, [wanted.parameter])
-    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
-    followed = Followed(begun.scene, wanted.parameter)
-    loci = FollowedLoci(followed, wanted.second or "")
+    refuse_contradictions(options)
+    second_range = _second_range(options)
+    changes, output, figure = options.changes or (), options.output, options.figure
+    refuse_outputs([options.scene, *files_of(options)], output, figure)
+    first = begun(
+        options, opened_scene(options.scene, changes, for_orbits=True), changes, [options.parameter]
+    )
+    refuse_overwriting(output, options.force, lambda there: there.get("history") == HISTORY)
+    followed = Followed(first.scene, options.parameter)
+    loci = FollowedLoci(followed, options.second or "")
     interrupted, failure = False, None
     with Terminal(stderr=True).status("Looking for orbits") as status:
         try:
-            _follow(wanted, begun, followed, loci, status.update)
+            _follow(options, first, second_range, loci, status.update)
         except KeyboardInterrupt:
             interrupted = True
         except VibroimpactError as problem:
@@ -94,15 +88,15 @@ def show_branches(
     if not followed.branches:
         raise OrbitError("follow: interrupted before there was an orbit.")
     _print(followed)
-    if begun.seed is None and begun.impacts is None and not (interrupted or failure):
-        for line in orbits_not_followed(followed, *wanted.span):
+    if first.seed is None and first.impacts is None and not (interrupted or failure):
+        for line in orbits_not_followed(followed, options.start, options.stop):
             say(line)
     _print_loci(loci)
     _write(loci if loci.loci else followed, output, figure)
     if loci.loci and output is not None:
         say(f"{output} has the curves over both numbers; branches are written without --second.")
-    elif wanted.second is not None and not loci.loci and output is not None:
-        say(f"No curves over {wanted.second} were found: {output} has the branches.")
+    elif options.second is not None and not loci.loci and output is not None:
+        say(f"No curves over {options.second} were found: {output} has the branches.")
     if failure is not None:
         raise failure
     if interrupted:
@@ -111,31 +105,36 @@ def show_branches(
 
 
 def _follow(
-    wanted: Wanted, begun: Begun, followed: Followed, loci: FollowedLoci, show: Callable[[str], None]
+    options: Follow,
+    first: Begun,
+    second_range: tuple[float, float] | None,
+    loci: FollowedLoci,
+    show: Callable[[str], None],
 ) -> None:
     def told(branch: Branch, orbit: BranchOrbit) -> None:
         if len(branch.orbits) % 20 == 1:
             many = counted(len(branch.orbits), "orbit")
-            show(f"{branch.name}: {many}, {wanted.parameter} {orbit.value:.6g}")
+            show(f"{branch.name}: {many}, {options.parameter} {orbit.value:.6g}")
 
     follow_branches(
-        followed.scene,
-        wanted.parameter,
-        *wanted.span,
-        impacts=begun.impacts,
-        periods=1 if begun.periods is None else begun.periods,
-        seed=begun.seed,
-        doublings=wanted.doublings,
-        longest=wanted.step,
+        first.scene,
+        options.parameter,
+        options.start,
+        options.stop,
+        impacts=first.impacts,
+        periods=1 if first.periods is None else first.periods,
+        seed=first.seed,
+        doublings=options.doublings,
+        longest=options.step,
         told=told,
-        looking=lambda value: show(f"Looking for orbits, {wanted.parameter} {value:.6g}"),
-        followed=followed,
+        looking=lambda value: show(f"Looking for orbits, {options.parameter} {value:.6g}"),
+        followed=loci.followed,
     )
-    low, high = wanted.second_span
-    if wanted.second is None or low is None or high is None:
+    if second_range is None:
         return
     ranges = [
-        FollowSettings(min(ends), max(ends), wanted.step) for ends in (wanted.span, (float(low), float(high)))
+        FollowSettings(min(ends), max(ends), options.step)
+        for ends in ((options.start, options.stop), second_range)
     ]
     follow_loci(
         loci, *ranges, told=lambda locus: show(f"{locus.kind}: {counted(len(locus.points), 'orbit')}")

@@ -5,27 +5,24 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
 import typer
 from rich.live import Live
 from rich.table import Table
 
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
-from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.commands.found import refuse_places, write_found
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, dataset_of, measured_cases
+from vibroimpact.orchestrator.operations.hard_cases import HardCases
 
 VERDICTS = ("wrong", "slow")
 """Of cases beyond their bound: a figure that is an error, and one that is a time."""
 
 
-def show_hard_cases(
-    only: Sequence[str], output: Path | None, figure: Path | None, force: bool, names: bool
-) -> None:
+def show_hard_cases(options: HardCases) -> None:
     """Run hard cases, print a table, and write what was asked for.
 
     Raises
@@ -33,13 +30,13 @@ def show_hard_cases(
     typer.Exit
         A figure is wrong, or Ctrl-C came; what was measured before is printed and written.
     """
-    if names:
+    only = options.only or ()
+    if options.names:
         for case in CASES:
             say(f"{case.name}: {case.title}")
         return
     cases_named(only)  # a name that is none is refused before anything is run
-    refuse_outputs([], output, figure)
-    refuse_overwriting(output, force, lambda there: there.get("results_kind") == "hard_cases")
+    refuse_places(options, [], results_kind="hard_cases")
     measured: list[Measured] = []
     interrupted = False
     try:
@@ -54,7 +51,7 @@ def show_hard_cases(
         interrupted = True
     if measured:
         wide_terminal().print(_table(measured))
-        _write(measured, output, figure)
+        write_found(dataset_of(measured), "hard_cases", options)
     missed = [one.case.name for one in measured if not one.is_met]
     met = f"{len(measured) - len(missed)} of {counted(len(measured), 'bound')} met"
     worded = (
@@ -70,18 +67,6 @@ def show_hard_cases(
 
 def _of(measured: Sequence[Measured], verdict: str) -> list[str]:
     return [one.case.name for one in measured if one.verdict == verdict]
-
-
-def _write(measured: Sequence[Measured], output: Path | None, figure: Path | None) -> None:
-    dataset = dataset_of(measured)
-    if output is not None:
-        write_results(dataset, output, kind="hard_cases")
-        say(f"Dataset written to {output}.")
-    if figure is not None:
-        from vibroimpact.analysis import figures  # half a second, which a table needs not
-
-        figures.save(figures.draw(dataset.assign_attrs(results_kind="hard_cases")), figure)
-        say(f"Figure written to {figure}.")
 
 
 @contextmanager

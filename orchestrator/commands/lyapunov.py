@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.commands.found import refuse_places, write_found
 from vibroimpact.analysis.dataset import dataset_file
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
-from vibroimpact.orchestrator.commands.energies import runs_of, write_found
+from vibroimpact.orchestrator.commands.energies import runs_of
+from vibroimpact.orchestrator.operations.lyapunov import Lyapunov
 from vibroimpact.orchestrator.orbits.lyapunov import lyapunov
 
 _NUMBER = re.compile(r"\d+")
@@ -22,16 +22,11 @@ _MOST_SHOWN = 30
 """Runs that are told one by one."""
 
 
-def show_exponents(
-    path: Path, output: Path | None, figure: Path | None, changes: Sequence[str], force: bool
-) -> None:
+def show_exponents(options: Lyapunov) -> None:
     """Find the exponents of the runs of a scene or a dataset; print, write and draw them."""
-    refuse_outputs([dataset_file(path)], output, figure)
-    same = ("lyapunov", str(path))
-    refuse_overwriting(
-        output, force, lambda there: (there.get("results_kind"), there.get("scene_file")) == same
-    )
-    with runs_of(path, changes) as dataset:
+    path = options.file
+    refuse_places(options, [dataset_file(path)], results_kind="lyapunov", scene_file=str(path))
+    with runs_of(path, options.changes or ()) as dataset:
         try:
             found = lyapunov(dataset)
         except DatasetError as problem:
@@ -44,7 +39,7 @@ def show_exponents(
     _print(found)
     for words, count in counted:
         say(f"{count} without: {words}")
-    write_found(found.assign_attrs(scene_file=str(path)), "lyapunov", output, figure)
+    write_found(found.assign_attrs(scene_file=str(path)), "lyapunov", options)
 
 
 def _counted(reasons: Sequence[str]) -> list[tuple[str, int]]:

@@ -2,39 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.commands.found import write_found
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.analysis.orbits.normal_forms import periods_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
-from vibroimpact.orchestrator.commands.energies import write_found
 from vibroimpact.orchestrator.commands.failures import counted
-from vibroimpact.orchestrator.orbits.maps import HISTORY, MapSettings, map_of
+from vibroimpact.orchestrator.operations.maps import Maps
+from vibroimpact.orchestrator.orbits.maps import HISTORY, MapSettings, map_of, settings_of
 from vibroimpact.orchestrator.ssp import opened_scene
 
 
-def show_map(
-    path: Path | None,
-    settings: MapSettings,
-    changes: Sequence[str],
-    output: Path | None,
-    figure: Path | None,
-    force: bool,
-) -> None:
-    """Find a map; tell, write and draw it."""
-    refuse_outputs([] if path is None else [path], output, figure)
-    if path is None and changes:
+def show_map(options: Maps) -> None:
+    """Find a map; tell, write and draw it.
+
+    Raises
+    ------
+    UsageError
+        Half a range is given, or changes without a scene.
+    """
+    settings, path = _settings(options), options.scene
+    refuse_outputs([] if path is None else [path], options.output, options.figure)
+    if path is None and options.changes:
         raise UsageError("--set: expected a scene to change, got none.")
-    scene = None if path is None else opened_scene(path, changes)
-    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
+    scene = None if path is None else opened_scene(path, options.changes or ())
+    refuse_overwriting(options.output, options.force, lambda there: there.get("history") == HISTORY)
     found = map_of(scene, settings)
     _tell(found)
-    write_found(found.assign_attrs({} if path is None else {"scene_file": str(path)}), "maps", output, figure)
+    write_found(found.assign_attrs({} if path is None else {"scene_file": str(path)}), "maps", options)
+
+
+def _settings(options: Maps) -> MapSettings:
+    start, stop = options.start, options.stop
+    if (start is None) != (stop is None):
+        raise UsageError("maps: from, to: expected both or neither, got one of them.")
+    return settings_of(
+        options.kind,
+        span=None if start is None or stop is None else (start, stop),
+        points=options.points,
+        alpha=options.alpha,
+        gamma=options.gamma,
+        restitution=options.restitution,
+        slope=options.slope,
+    )
 
 
 def _tell(found: xr.Dataset) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,9 @@ from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.branches import dataset_of_orbits
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
-from vibroimpact.orchestrator.commands.beginning import Beginning
+from vibroimpact.orchestrator.commands.beginning import begun, files_of, is_seed, refuse_contradictions
 from vibroimpact.orchestrator.commands.failures import counted
+from vibroimpact.orchestrator.operations.orbit import FindOrbits
 from vibroimpact.orchestrator.orbits.find import find_orbits
 from vibroimpact.orchestrator.orbits.follow import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
@@ -24,39 +24,17 @@ from vibroimpact.orchestrator.ssp import opened_scene
 HISTORY = "periodic orbits found by vibroimpact"
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """Orbits that are looked for, as options give them."""
-
-    beginning: Beginning
-    penetrating: bool
-
-    @property
-    def text(self) -> str:
-        """What they are called."""
-        given = self.beginning
-        if given.is_seed:
-            return "near to the seed"
-        if given.impacts is None and given.periods is None:
-            return "P(1,1), and none that a long run ends on"
-        return f"P({given.impacts or 1},{given.periods or 1})"
-
-
-def show_orbits(
-    path: Path,
-    wanted: Wanted,
-    changes: Sequence[str],
-    output: Path | None,
-    figure: Path | None,
-    force: bool,
-) -> None:
+def show_orbits(options: FindOrbits) -> None:
     """Find orbits, print them, and write and draw them where that was asked for."""
-    wanted.beginning.refuse()
-    refuse_outputs([path, *wanted.beginning.files], output, figure)
-    found = wanted.beginning.begun(opened_scene(path, changes, for_orbits=True), changes)
+    refuse_contradictions(options)
+    changes, output, figure = options.changes or (), options.output, options.figure
+    refuse_outputs([options.scene, *files_of(options)], output, figure)
+    found = begun(options, opened_scene(options.scene, changes, for_orbits=True), changes)
     scene = found.scene
-    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
-    orbits = find_orbits(scene, found.impacts, found.periods, seed=found.seed, penetrating=wanted.penetrating)
+    refuse_overwriting(output, options.force, lambda there: there.get("history") == HISTORY)
+    orbits = find_orbits(
+        scene, found.impacts, found.periods, seed=found.seed, penetrating=options.penetrating
+    )
     rows = table(
         f"Periodic orbits: {scene.title or scene.source}",
         *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
@@ -67,7 +45,11 @@ def show_orbits(
     if orbits:
         wide_terminal().print(rows)
     physical = [orbit for orbit in orbits if orbit.is_physical]
-    say(f"{counted(len(physical), 'physical orbit')}." if physical else f"No physical orbit {wanted.text}.")
+    say(
+        f"{counted(len(physical), 'physical orbit')}."
+        if physical
+        else f"No physical orbit {_called(options)}."
+    )
     _write(scene, physical, output)
     if figure is not None and orbits:
         from vibroimpact.analysis import figures  # half a second, which a table needs not
@@ -76,6 +58,15 @@ def show_orbits(
         with writing(figure):
             figures.save(draw_orbits(orbits, scene.units), figure)
         say(f"Figure written to {figure}.")
+
+
+def _called(options: FindOrbits) -> str:
+    """Return what the orbits that are looked for are called."""
+    if is_seed(options):
+        return "near to the seed"
+    if options.impacts is None and options.periods is None:
+        return "P(1,1), and none that a long run ends on"
+    return f"P({options.impacts or 1},{options.periods or 1})"
 
 
 def _write(scene: Scene, physical: Sequence[PeriodicOrbit], output: Path | None) -> None:

@@ -17,27 +17,17 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.orchestrator.campaign.manifest import holds_scene
+from vibroimpact.orchestrator.operations.replay import Replay
 from vibroimpact.orchestrator.replay import ReplayFit
 from vibroimpact.orchestrator.replay.output import fitted_scene_text
 from vibroimpact.orchestrator.replay.replaying import WholeReplay, replay_scene, with_recordings
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
 
-def replay_recordings(
-    scene: Path,
-    recordings: Sequence[Path],
-    score: Sequence[Path],
-    output: Path | None,
-    fit: str | None,
-    save_scene: Path | None,
-    figure: Path | None,
-    execution: str | None,
-    workers: int | None,
-    scheduler: str | None,
-    force: bool,
-) -> None:
+def replay_recordings(options: Replay) -> None:
     """Replay recordings into a dataset, with scores and fits, or into the folder of a campaign."""
-    loaded = load_scene(scene)
+    loaded, output = load_scene(options.scene), options.output
+    recordings = options.recordings or ()
     if output is None:
         raise UsageError(
             "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
@@ -48,25 +38,27 @@ def replay_recordings(
                 f"{output}: expected a dataset NAME.nc or the folder of a campaign, got neither. Choose another name."
             )
         refuse_folder(output)
-        _refuse_with_campaign(fit, score or None, save_scene, figure, execution)
-        _campaign(with_recordings(loaded, recordings), output, workers, scheduler)
+        _refuse_with_campaign(options)
+        _campaign(with_recordings(loaded, recordings), output, options.workers, options.scheduler)
         return
-    refuse_outputs([scene, *loaded.files, *recordings, *score], output, figure)
+    read = [options.scene, *loaded.files, *recordings, *(options.score or ())]
+    refuse_outputs(read, output, options.figure)
     named = with_recordings(loaded, recordings)
-    refuse_overwriting(output, force, lambda there: holds_scene(there, named))
-    if save_scene is not None:
-        refuse_outputs([scene, *recordings, *score], save_scene, ending=".toml")
-        _refuse_saving(save_scene, fit, force)
-    if workers is not None or scheduler is not None:
+    refuse_overwriting(output, options.force, lambda there: holds_scene(there, named))
+    if options.save_scene is not None:
+        refuse_outputs(read, options.save_scene, ending=".toml")
+        _refuse_saving(options.save_scene, options.fit, options.force)
+    if options.workers is not None or options.scheduler is not None:
         raise UsageError("--workers, --scheduler: expected the folder of a campaign as output, got a file.")
-    if figure is not None and loaded.replay is not None and not loaded.replay.compare:
+    if options.figure is not None and loaded.replay is not None and not loaded.replay.compare:
         raise UsageError(
-            f"--figure: expected a scene that compares something, got {scene} without. Add compare."
+            f"--figure: expected a scene that compares something, got {options.scene} without. Add compare."
         )
-    _to_dataset(loaded, recordings, score, output, fit, save_scene, figure, execution)
+    _to_dataset(loaded, options, output)
 
 
-def _refuse_with_campaign(*others: object) -> None:
+def _refuse_with_campaign(options: Replay) -> None:
+    others = (options.fit, options.score or None, options.save_scene, options.figure, options.execution)
     if any(other is not None for other in others):
         raise UsageError(
             "--output: expected a dataset (.nc) beside --fit, --score, --save-scene, --figure or --execution, "
@@ -94,27 +86,24 @@ def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | 
     compute(scene, folder, workers, scheduler)
 
 
-def _to_dataset(
-    scene: Scene,
-    recordings: Sequence[Path],
-    scored: Sequence[Path],
-    output: Path,
-    fit: str | None,
-    save_scene: Path | None,
-    figure: Path | None,
-    execution: str | None,
-) -> None:
+def _to_dataset(scene: Scene, options: Replay, output: Path) -> None:
     began = time.perf_counter()
-    with _fitting(fit) as told:
-        whole = replay_scene(scene, recordings, fit=fit, score=scored, execution=execution, told=told)
+    with _fitting(options.fit) as told:
+        whole = replay_scene(
+            scene,
+            options.recordings or (),
+            fit=options.fit,
+            score=options.score or (),
+            execution=options.execution,
+            told=told,
+        )
     console = Terminal()
     print_replays(console, whole)
-    _write(whole.dataset, output, figure)
-    if save_scene is not None and whole.fit is not None:
-        _save_scene(
-            scene, whole.fit, [replay.name for replay in whole.replays if replay.use == "fitted"], save_scene
-        )
-        console.print(f"Scene with the numbers found written to {save_scene}.", soft_wrap=True)
+    _write(whole.dataset, output, options.figure)
+    if options.save_scene is not None and whole.fit is not None:
+        fitted = [replay.name for replay in whole.replays if replay.use == "fitted"]
+        _save_scene(scene, whole.fit, fitted, options.save_scene)
+        console.print(f"Scene with the numbers found written to {options.save_scene}.", soft_wrap=True)
     console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 

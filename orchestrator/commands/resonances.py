@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.commands.found import refuse_places, write_found
 from vibroimpact.analysis.dataset import dataset_file
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
-from vibroimpact.orchestrator.commands.energies import runs_of, write_found
+from vibroimpact.orchestrator.commands.energies import runs_of
+from vibroimpact.orchestrator.operations.resonances import Resonances
 from vibroimpact.orchestrator.orbits.resonances import resonances
 
 
-def show_resonances(
-    path: Path, output: Path | None, figure: Path | None, changes: Sequence[str], force: bool
-) -> None:
+def show_resonances(options: Resonances) -> None:
     """Find the peaks of a frequency sweep of a scene or a dataset; print, write and draw them."""
-    refuse_outputs([dataset_file(path)], output, figure)
-    same = ("resonances", str(path))
-    refuse_overwriting(
-        output, force, lambda there: (there.get("results_kind"), there.get("scene_file")) == same
-    )
-    with runs_of(path, changes) as dataset:
+    path = options.file
+    refuse_places(options, [dataset_file(path)], results_kind="resonances", scene_file=str(path))
+    with runs_of(path, options.changes or ()) as dataset:
         try:
             found = resonances(dataset)
         except (DatasetError, UsageError) as problem:
@@ -49,7 +44,7 @@ def show_resonances(
     say(
         f"Natural frequencies{unit}: {natural}. A shift is that of one elastic, undamped, unforced mode: a guess."
     )
-    write_found(found, "resonances", output, figure)
+    write_found(found, "resonances", options)
 
 
 def _rows(found: xr.Dataset) -> Iterator[tuple[str, ...]]:

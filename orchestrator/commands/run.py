@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from pathlib import Path
 
 import typer
 
@@ -15,13 +13,12 @@ from vibroimpact.orchestrator.campaign.manifest import holds_scene
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import FAILED, counted, outcome_lines
 from vibroimpact.orchestrator.commands.preparing import prepared
+from vibroimpact.orchestrator.operations.run import Run
 from vibroimpact.orchestrator.scene.summary import in_one_line
 from vibroimpact.orchestrator.ssp import opened_scene
 
 
-def run_to_dataset(
-    scene: Path, output: Path, changes: Sequence[str], force: bool, strict: bool = False
-) -> None:
+def run_to_dataset(options: Run) -> None:
     """Run a scene into a dataset and say what was run and what failed.
 
     Raises
@@ -30,10 +27,11 @@ def run_to_dataset(
         The only run failed.
     """
     began = time.perf_counter()
-    loaded = opened_scene(scene, changes, strict=strict)
-    refuse_outputs([scene, *loaded.files], output)
+    output = options.output
+    loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)
+    refuse_outputs([options.scene, *loaded.files], output)
     loaded = prepared(loaded)
-    refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
+    refuse_overwriting(output, options.force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:
         outcomes = run_scene(loaded, output, progress=progress)
     runs = sum(outcomes.values())

@@ -1,7 +1,1 @@
-"""The commands of the service and of its client: `options` declares them, `asking` is what those of the client do."""
-
-from __future__ import annotations
-
-from vibroimpact.service.commands.options import register
-
-__all__ = ["register"]
+"""What the operations of this package do on the command line, a module for each."""

@@ -3,49 +3,32 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.service.client import RemoteJob, Service, ServiceError
+from vibroimpact.service.operations.cancel import Cancel
+from vibroimpact.service.operations.fetch import Fetch
+from vibroimpact.service.operations.status import Status
+from vibroimpact.service.operations.submit import Submit
 
 
-@dataclass(frozen=True, slots=True)
-class Replayed:
-    """What `submit` is told of a scene that replays: recordings, a fit, recordings that are scored alone."""
-
-    recordings: Sequence[Path] = ()
-    fit: str | None = None
-    score: Sequence[Path] = ()
-
-    @property
-    def files(self) -> tuple[Sequence[Path], Sequence[Path]]:
-        """What is uploaded."""
-        return self.recordings, self.score
-
-
-def submit_scene(
-    scene: Path,
-    url: str | None,
-    folder: Path | None,
-    workers: int | None,
-    wait: bool,
-    replay: Replayed | None = None,
-) -> None:
+def submit_scene(options: Submit) -> None:
     """Submit a scene, with recordings that are uploaded before it; the id is the one line of standard output."""
-    asked = replay or Replayed()
-    with Service(url, folder=folder) as service:
-        fitted, scored = ([service.upload_recording(path) for path in paths] for paths in asked.files)
+    with Service(options.service, folder=options.data) as service:
+        fitted = [service.upload_recording(path) for path in options.recording or ()]
+        scored = [service.upload_recording(path) for path in options.score or ()]
         try:
-            job = service.submit(scene, workers=workers, recordings=fitted, fit=asked.fit, score=scored)
+            job = service.submit(
+                options.scene, workers=options.workers, recordings=fitted, fit=options.fit, score=scored
+            )
         except ServiceError as error:
             if error.problems:
-                raise SceneError([_placed(scene, one) for one in error.problems]) from None
+                raise SceneError([_placed(options.scene, one) for one in error.problems]) from None
             raise
         say(job.id)
-        if not wait:
+        if not options.wait:
             return
         for event in job.events():
             say(_line(event | {"id": ""}), err=True)
@@ -53,11 +36,11 @@ def submit_scene(
             raise ServiceError(f"{job.id}: {job.status['state']}: {job.status['message']}")
 
 
-def show_status(name: str | None, url: str | None, folder: Path | None) -> None:
+def show_status(options: Status) -> None:
     """Print where one campaign is, or all."""
-    with Service(url, folder=folder) as service:
-        if name is not None:
-            say(_line(service.job(name).status))
+    with Service(options.service, folder=options.data) as service:
+        if options.name is not None:
+            say(_line(service.job(options.name).status))
             return
         count = 0
         for job in service.jobs():
@@ -67,17 +50,17 @@ def show_status(name: str | None, url: str | None, folder: Path | None) -> None:
             say("No campaigns.", err=True)
 
 
-def fetch_dataset(name: str, output: Path, url: str | None, folder: Path | None) -> None:
+def fetch_dataset(options: Fetch) -> None:
     """Write the dataset of a campaign."""
-    with Service(url, folder=folder) as service:
-        job: RemoteJob = service.job(name)
-        say(f"Dataset written to {job.fetch(output)}.", err=sys.stdout.isatty())
+    with Service(options.service, folder=options.data) as service:
+        job: RemoteJob = service.job(options.name)
+        say(f"Dataset written to {job.fetch(options.output)}.", err=sys.stdout.isatty())
 
 
-def cancel_campaign(name: str, url: str | None, folder: Path | None) -> None:
+def cancel_campaign(options: Cancel) -> None:
     """Cancel a campaign."""
-    with Service(url, folder=folder) as service:
-        say(_line(service.job(name).cancel().status))
+    with Service(options.service, folder=options.data) as service:
+        say(_line(service.job(options.name).cancel().status))
 
 
 def _placed(scene: Path, problem: dict[str, object]) -> str:

@@ -10,9 +10,9 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from vibroimpact.service.bodies import BoundedRoute
-from vibroimpact.service.estimates import Estimate
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.recordings import RecordingStore
+from vibroimpact.service.requests import Estimate
 from vibroimpact.service.routes.accepting import IdempotencyKey, accepted
 from vibroimpact.service.routes.described import JobAnswer, problems
 from vibroimpact.service.routes.recordings import file_of, known_recording
@@ -52,8 +52,9 @@ def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
     ) -> JobAnswer:
         """Accept an estimate, as `vibroimpact estimate` or `spikes` makes it: a job, with dataset, figure and log."""
         name, file = _data_of(given, store, recordings)
-        options = {"data": name, "asked": given.estimate.model_dump(mode="json")}
-        title = f"{given.estimate.kind} of {name}"
+        estimate = given.estimate.model_dump(mode="json")
+        options = {"data": name, "asked": estimate}
+        title = f"{estimate['kind']} of {name}"
         asked = Asked(Kind.estimate, title, files={name: file}, options=options)
         return accepted(store, asked, given, response, idempotency_key)
 

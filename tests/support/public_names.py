@@ -8,7 +8,9 @@ a dataset its variables and attributes.
 from __future__ import annotations
 
 import enum
+import importlib
 import inspect
+import json
 import re
 import sys
 import typing
@@ -20,6 +22,7 @@ from typing import Any
 import typer
 
 import vibroimpact as vi
+from vibroimpact.orchestrator.commands import table
 from vibroimpact.orchestrator.commands.cli import app, load_commands
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -120,6 +123,22 @@ def _parameter(given: Any, annotation: Any) -> str:
     return f"{' '.join((*given.opts, *given.secondary_opts))} ({', '.join(said)}): {declared.help or ''}"
 
 
+def first_lines() -> str:
+    """Return the first lines of the commands' help, which a list of commands shows."""
+    lines = {words: _first_paragraph(_declared(place)) for words, place in table.paths().items()}
+    return json.dumps(lines, indent=1) + "\n"
+
+
+def _declared(place: str) -> type:
+    module, _, name = place.partition(":")
+    found: type = getattr(importlib.import_module(f"vibroimpact.{module}"), name)
+    return found
+
+
+def _first_paragraph(declared: type) -> str:
+    return " ".join((inspect.getdoc(declared) or "").partition("\n\n")[0].split())
+
+
 def main() -> None:
     """Write each text into its file."""
     sys.path.insert(0, str(TESTS))
@@ -127,7 +146,14 @@ def main() -> None:
     from support.openapi import openapi
     from support.scene_keys import scene_keys
 
-    texts = {NAMES: names, COMMANDS: commands, OPENAPI: openapi, SCENE_KEYS: scene_keys, DATASETS: datasets}
+    texts = {
+        table.FIRST_LINES: first_lines,
+        NAMES: names,
+        COMMANDS: commands,
+        OPENAPI: openapi,
+        SCENE_KEYS: scene_keys,
+        DATASETS: datasets,
+    }
     for path, text in texts.items():
         path.write_text(text(), encoding="utf-8")
 

@@ -10,6 +10,7 @@ from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset.outputs import refuse_folder, writing
 from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.terminal import say
+from vibroimpact.hardware.operations.rig_sweep import MeasureSweep
 from vibroimpact.hardware.programs.sweep.calibrating import calibrations_of
 from vibroimpact.hardware.programs.sweep.drawing import draw_plan
 from vibroimpact.hardware.programs.sweep.plan import planned
@@ -20,15 +21,15 @@ from vibroimpact.orchestrator.campaign.progress import clock, shown_progress
 PLAN = "plan.png"
 
 
-def sweep_rig(file: Path, folder: Path, rig: str | None, dry_run: bool) -> None:
+def sweep_rig(options: MeasureSweep) -> None:
     """Measure the sweep of a file into a folder, or only draw what it would drive."""
-    refuse_folder(folder)
-    settings = read_sweep(file)
-    if dry_run:
-        _draw_only(settings, folder)
+    refuse_folder(options.output)
+    settings = read_sweep(options.file)
+    if options.dry_run:
+        _draw_only(settings, options.output)
         return
     with shown_progress() as progress:
-        report = measure(settings, folder, rig, progress)
+        report = measure(settings, options.output, options.rig, progress)
     if report.before == report.planned:
         say(f"Nothing to do: all {report.planned} steps are in {report.dataset} already.")
         return

@@ -12,11 +12,12 @@ import xarray as xr
 from support.spike_signals import channel, pulses
 from typer.testing import CliRunner
 
-from vibroimpact.analysis.commands import options
 from vibroimpact.analysis.intervals import dimension
+from vibroimpact.analysis.operations import spikes as declared
 from vibroimpact.analysis.recording import EventTrain, Recording, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
 from vibroimpact.fmus.wording import command_line
+from vibroimpact.orchestrator.commands.typer_form import as_function
 
 RATE = 20_000.0
 #: 40 half-sines of 1 ms and peak 2 N, .05 s apart.
@@ -37,7 +38,7 @@ def record(tmp_path: Path) -> Path:
 
 def spikes(*arguments: str | Path) -> str:
     app = typer.Typer()
-    app.command("spikes")(options.spikes)
+    app.command("spikes")(as_function(declared.Spikes))
     with command_line():
         done = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if done.exception and not isinstance(done.exception, SystemExit):
@@ -188,7 +189,7 @@ def test_an_unknown_channel_is_answered_with_the_names_there_are(record: Path) -
 
 
 def test_the_defaults_of_the_dimension_are_those_of_the_report() -> None:
-    assert (options.EMBEDDING, options.THEILER) == (dimension.EMBEDDING, dimension.THEILER)
+    assert (declared.EMBEDDING, declared.THEILER) == (dimension.EMBEDDING, dimension.THEILER)
 
 
 def test_embedding_and_theiler_window_reach_the_dimension(record: Path, tmp_path: Path) -> None:

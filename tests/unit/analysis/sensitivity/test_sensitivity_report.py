@@ -11,8 +11,8 @@ import xarray as xr
 from support.command_line import in_this_process
 
 import vibroimpact as vi
-from vibroimpact.analysis.commands import options
 from vibroimpact.analysis.dataset import Outcome, open_measured
+from vibroimpact.analysis.operations import sensitivity as declared
 from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 
 SCENE = """
@@ -253,4 +253,4 @@ def test_a_file_that_is_no_campaign_is_one_line(tmp_path: Path):
 
 
 def test_the_command_has_the_defaults_of_the_function() -> None:
-    assert (options.LEVEL, options.RESAMPLES) == (LEVEL, RESAMPLES)
+    assert (declared.LEVEL, declared.RESAMPLES) == (LEVEL, RESAMPLES)

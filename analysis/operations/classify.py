@@ -1,0 +1,27 @@
+"""Operation `classify`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Positional, operation
+
+
+@operation("analysis.commands.classify:show_classes", Door("classify", without=("output",)))
+class Classify(Operation):
+    """Say what each run of a dataset is: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+
+    From the strobe and the extrema of each recorded period. A slow transient is told from a doubled period by its
+    distances, which shrink by a constant factor; 40 recorded periods tell chaos.
+
+    Example: vibroimpact classify campaign -o classes.nc --figure classes.png
+    """
+
+    file: Annotated[
+        Path,
+        Positional(python="dataset: xr.Dataset", help="Dataset of runs (.nc), or the folder of a campaign."),
+    ]
+    output: DatasetFile = None
+    figure: FigureFile = None
+    force: Force = False

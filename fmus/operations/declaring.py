@@ -1,0 +1,158 @@
+"""The words of arguments, and the class that declares an operation."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from collections.abc import Callable, Iterator
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    NamedTuple,
+    TypeVar,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+ROOT = __name__.partition(".")[0]
+Declared = TypeVar("Declared", bound="Operation")
+
+
+class Request(NamedTuple):
+    """Form of an argument in the body of a request to the service.
+
+    Parameters
+    ----------
+    name : str
+        Of its key; empty: that of the field.
+    above, least, most : float, optional
+        Limits of a number: below all allowed ones, the first and the last allowed.
+    choices : tuple of str
+        Texts that are allowed; empty: any of 1 to 200 letters.
+    """
+
+    name: str = ""
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+class Argument:
+    """Words and limits of an argument.
+
+    Parameters
+    ----------
+    *names : str
+        Its options on the command line; none: made from the name of the field.
+    help : str
+        What it says, with its unit.
+    metavar : str, optional
+        Stands for its value in the help.
+    min, max : float, optional
+        Limits of a number, both allowed.
+    python : str, optional
+        Its form in the Python door where that differs, as in a signature; empty: it is not there.
+    request : Request, optional
+        Its form in the body of a request; None: it is not there.
+    """
+
+    def __init__(
+        self,
+        *names: str,
+        help: str,
+        metavar: str | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        python: str | None = None,
+        request: Request | None = None,
+    ) -> None:
+        self.names = names
+        self.help = help
+        self.metavar = metavar
+        self.min, self.max = min, max
+        self.python, self.request = python, request
+
+
+class Option(Argument):
+    """An argument that has a name on the command line."""
+
+
+class Positional(Argument):
+    """An argument that the command line knows by its place."""
+
+
+class Field(NamedTuple):
+    """A declared argument: name, type, default (`MISSING`: required) and words."""
+
+    name: str
+    type: Any
+    default: Any
+    words: Argument
+
+    @property
+    def is_required(self) -> bool:
+        """Whether it has no default."""
+        return self.default is dataclasses.MISSING
+
+
+class Door(NamedTuple):
+    """The function of the Python door that does what an operation does.
+
+    Parameters
+    ----------
+    name : str
+        In `vibroimpact`.
+    also : tuple of str
+        Parameters that only it has, as in its signature.
+    without : tuple of str
+        Arguments that it does not have, beside those without a form in Python.
+    """
+
+    name: str
+    also: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+
+class Operation:
+    """A declared operation; its docstring is the help of its command.
+
+    Attributes
+    ----------
+    runs : str
+        `module:function` below the package: called with the operation, it carries it out.
+    door : Door or None
+        The function in Python, whose signature a test compares with the arguments.
+    """
+
+    runs: ClassVar[str]
+    door: ClassVar[Door | None]
+
+    def carry_out(self) -> None:
+        """Call the function that the operation names."""
+        place, _, name = self.runs.partition(":")
+        getattr(importlib.import_module(f"{ROOT}.{place}"), name)(self)
+
+    @classmethod
+    def fields(cls) -> Iterator[Field]:
+        """Yield the arguments in their order."""
+        hints = get_type_hints(cls, include_extras=True)
+        for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+            hint = hints[field.name]
+            assert get_origin(hint) is Annotated, f"{cls.__name__}.{field.name}: an argument without words"
+            kind, words = get_args(hint)[:2]
+            yield Field(field.name, kind, field.default, words)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def operation(runs: str, door: Door | None = None) -> Callable[[type[Declared]], type[Declared]]:
+    """Return a decorator that declares an operation: see `Operation` for what it is given."""
+
+    def declared(cls: type[Declared]) -> type[Declared]:
+        cls.runs, cls.door = runs, door
+        return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
+    return declared

@@ -1,0 +1,18 @@
+"""Operation `fmu build`: the components of the package, compiled for this machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations import Operation, Option, operation
+
+
+@operation("fmus.commands.fmu:build_into")
+class BuildFmus(Operation):
+    """Compile all components for this machine.
+
+    Example: vibroimpact fmu build
+    """
+
+    output: Annotated[Path | None, Option(help="Folder to fill; else that of the package.")] = None

@@ -1,0 +1,26 @@
+"""Arguments that operations of several packages have, worded once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations.declaring import Option
+
+#: Help of the option of all commands that read FMUs of other tools.
+STRICT = "Refuse FMUs that may run wrong, instead of saying so."
+Force = Annotated[
+    bool,
+    Option(
+        "--force",
+        help="Overwrite a file that holds something else; the same command may be repeated without.",
+        python="",
+    ),
+]
+FigureFile = Annotated[
+    Path | None, Option("--figure", help="Figure to write: .png, .pdf or .svg.", python="")
+]
+DatasetFile = Annotated[
+    Path | None,
+    Option("--output", "-o", help="Dataset to write (.nc).", python="path: PathLike | None = None"),
+]

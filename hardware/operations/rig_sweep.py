@@ -1,0 +1,43 @@
+"""Operation `rig sweep`: a measured frequency sweep into a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations import Door, Operation, Option, Positional, operation
+from vibroimpact.hardware.operations.arguments import RigChoice
+
+
+@operation(
+    "hardware.programs.sweep.command:sweep_rig", Door("measure_sweep", also=("progress: bool = True",))
+)
+class MeasureSweep(Operation):
+    """Measure a frequency sweep, up and down, as a dataset like that of a campaign; the same command goes on with it.
+
+    Ctrl-C brings the output to rest; what is measured is kept.
+
+    Example: vibroimpact rig sweep examples/rig/sweep.toml -o sweep
+    """
+
+    file: Annotated[
+        Path,
+        Positional(
+            help="File of a sweep (TOML).", metavar="SWEEP.toml", python="file: str | os.PathLike[str]"
+        ),
+    ]
+    output: Annotated[
+        Path,
+        Option(
+            "--output",
+            "-o",
+            help="Folder of its dataset.",
+            metavar="FOLDER",
+            python="folder: str | os.PathLike[str]",
+        ),
+    ]
+    rig: RigChoice = None
+    dry_run: Annotated[
+        bool,
+        Option("--dry-run", help="Draw the planned output, say how long it takes, drive nothing.", python=""),
+    ] = False

@@ -1,0 +1,139 @@
+"""Every command of the package: where its operation is declared, and where `--help` shows it.
+
+Commands stand in the order in which they are used. Their first lines are in `first_lines.json`, which
+`python -P tests/support/public_names.py` writes: a list of commands imports no operation.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+FIRST_LINES = Path(__file__).with_name("first_lines.json")
+
+
+class Group(NamedTuple):
+    """Commands with one word before them; `form` is the class of the group, where it is one of its own."""
+
+    words: str
+    commands: Mapping[str, str]
+    form: str = ""
+
+
+GROUPS: Mapping[str, Group] = {
+    "estimate": Group(
+        "Estimate damping, frequency, damping law, frequency response, or restitution from a signal.",
+        {
+            "decay": "analysis.operations.estimate_decay:EstimateDecay",
+            "impacts": "analysis.operations.estimate_impacts:EstimateImpacts",
+            "bounces": "analysis.operations.estimate_bounces:EstimateBounces",
+            "response": "analysis.operations.estimate_response:EstimateResponse",
+        },
+        "analysis.commands.estimate_group:EstimateGroup",
+    ),
+    "fmu": Group(
+        "List, build, check and export the FMUs of the package.",
+        {
+            "list": "fmus.operations.fmu_list:ListFmus",
+            "build": "fmus.operations.fmu_build:BuildFmus",
+            "check": "fmus.operations.fmu_check:CheckFmus",
+            "replay": "analysis.operations.fmu_replay:ExportReplay",
+            "export": "orchestrator.operations.fmu_export:ExportFmu",
+        },
+    ),
+    "ssp": Group(
+        "Exchange systems of FMUs with other tools.",
+        {
+            "export": "orchestrator.operations.ssp_export:ExportSsp",
+            "import": "orchestrator.operations.ssp_import:ImportSsp",
+        },
+    ),
+    "rig": Group(
+        "Rigs: boards of NI, and a virtual one.",
+        {
+            "serve": "hardware.operations.rig_serve:ServeRig",
+            "devices": "hardware.operations.rig_devices:ListDevices",
+            "record": "hardware.operations.rig_record:Record",
+            "sine": "hardware.operations.rig_sine:DriveSine",
+            "spikes": "hardware.operations.rig_spikes:RecordSpikes",
+            "recover": "hardware.operations.rig_recover:Recover",
+            "sweep": "hardware.operations.rig_sweep:MeasureSweep",
+        },
+    ),
+}
+COMMANDS: Mapping[str, str] = {
+    "check": "orchestrator.operations.check:Check",
+    "run": "orchestrator.operations.run:Run",
+    "campaign": "orchestrator.operations.campaign:Campaign",
+    "demo": "orchestrator.operations.demo:Demo",
+    "plot": "analysis.operations.plot:Plot",
+    "describe": "analysis.operations.describe:Describe",
+    "accuracy": "orchestrator.operations.accuracy:Accuracy",
+    "effects": "orchestrator.operations.effects:Effects",
+    "sensitivity": "analysis.operations.sensitivity:Sensitivity",
+    "hard-cases": "orchestrator.operations.hard_cases:HardCases",
+    "import": "hardware.operations.import_files:ImportFiles",
+    "replay": "orchestrator.operations.replay:Replay",
+    "spikes": "analysis.operations.spikes:Spikes",
+    "orbit": "orchestrator.operations.orbit:FindOrbits",
+    "follow": "orchestrator.operations.follow:Follow",
+    "maps": "orchestrator.operations.maps:Maps",
+    "classify": "analysis.operations.classify:Classify",
+    "lyapunov": "orchestrator.operations.lyapunov:Lyapunov",
+    "energies": "orchestrator.operations.energies:Energies",
+    "resonances": "orchestrator.operations.resonances:Resonances",
+    "basins": "orchestrator.operations.basins:Basins",
+    "control": "orchestrator.operations.control:Control",
+    "serve": "service.operations.serve:Serve",
+    "submit": "service.operations.submit:Submit",
+    "status": "service.operations.status:Status",
+    "fetch": "service.operations.fetch:Fetch",
+    "cancel": "service.operations.cancel:Cancel",
+}
+PANELS: Mapping[str, tuple[str, ...]] = {
+    "Simulate": ("check", "run", "campaign", "demo"),
+    "Look": ("plot", "describe"),
+    "Measure and compare": (
+        "accuracy",
+        "effects",
+        "sensitivity",
+        "hard-cases",
+        "import",
+        "replay",
+        "estimate",
+        "spikes",
+    ),
+    "Orbits": (
+        "orbit",
+        "follow",
+        "maps",
+        "classify",
+        "lyapunov",
+        "energies",
+        "resonances",
+        "basins",
+        "control",
+    ),
+    "Exchange": ("fmu", "ssp"),
+    "Rigs": ("rig",),
+    "Serve": ("serve", "submit", "status", "fetch", "cancel"),
+}
+"""Commands and groups as `--help` shows them; those of other packages come last."""
+
+
+@functools.cache
+def first_lines() -> Mapping[str, str]:
+    """Return the first line of the help of each command, by the words of the command."""
+    lines: dict[str, str] = json.loads(FIRST_LINES.read_text(encoding="utf-8"))
+    return lines
+
+
+def paths() -> Mapping[str, str]:
+    """Return where the operation of each command is declared, by the words of the command."""
+    inner = {
+        f"{name} {word}": place for name, group in GROUPS.items() for word, place in group.commands.items()
+    }
+    return {**COMMANDS, **inner}

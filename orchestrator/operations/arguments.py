@@ -1,0 +1,46 @@
+"""Arguments that operations on scenes share, worded once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations import STRICT, Option, Positional
+
+SceneFile = Annotated[
+    Path, Positional(help="Scene file (TOML), or a system (SSP).", python="scene: SceneLike")
+]
+SceneOrDataset = Annotated[
+    Path,
+    Positional(
+        help="Scene file (TOML); or the dataset of its runs (.nc), the folder of a campaign.",
+        python="dataset: xr.Dataset | str | PathLike[str]",
+    ),
+]
+Strict = Annotated[bool, Option("--strict", help=STRICT, python="")]
+Changes = Annotated[
+    list[str] | None,
+    Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scene before it is checked, the key as messages write it; may be repeated.",
+        python="",
+    ),
+]
+Seed = Annotated[
+    str | None,
+    Option(
+        metavar="PHASE:STOP,...",
+        help="Forcing phases (rad) of impacts near to those of an orbit, and their stops (1).",
+        python="seed: Sequence[tuple[float, int]] | None = None",
+    ),
+]
+FromDataset = Annotated[
+    Path | None,
+    Option(
+        metavar="FILE",
+        help="Dataset (.nc, or the folder of a campaign) on the orbit of whose run it begins.",
+        python="",
+    ),
+]
+Run = Annotated[int | None, Option(help="run_index of that run, where there are several.", min=0, python="")]

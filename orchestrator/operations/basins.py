@@ -1,0 +1,51 @@
+"""Operation `basins`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
+
+
+@operation("orchestrator.commands.basins:show_basins", Door("basins", without=("output",)))
+class Basins(Operation):
+    """Find which attractor each start of a plane of displacements and velocities ends on, and the share of each.
+
+    Attractors are found by long runs, named as classify names runs, and a start counts as soon as it is so near to one
+    that all starts tried at that distance came back.
+
+    Example: vibroimpact basins examples/basins.toml --points 500 -o basins.nc --figure basins.png
+    """
+
+    scene: SceneFile
+    x: Annotated[
+        str | None,
+        Option(
+            metavar="LOW:HIGH",
+            python="x: Span | None = None",
+            help="Displacements at the start (m); twice the scene's own.",
+        ),
+    ] = None
+    y: Annotated[
+        str | None,
+        Option(
+            metavar="LOW:HIGH",
+            python="y: Span | None = None",
+            help="Velocities at the start (m/s); twice the scene's own.",
+        ),
+    ] = None
+    points: Annotated[
+        str,
+        Option(
+            metavar="N or NxM", python="points: tuple[int, int] = (200, 200)", help="Starts along both axes."
+        ),
+    ] = "200"
+    number: Annotated[
+        int | None,
+        Option(help="Mass of a chain (the one that is hit first) or mode of a beam (1) that starts so."),
+    ] = None
+    output: DatasetFile = None
+    figure: FigureFile = None
+    changes: Changes = None
+    force: Force = False

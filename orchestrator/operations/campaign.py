@@ -1,0 +1,39 @@
+"""Operation `campaign`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations import Door, Operation, Option, Positional, operation
+from vibroimpact.orchestrator.operations.arguments import Changes, Strict
+
+
+@operation("orchestrator.commands.campaign:run_to_folder", Door("campaign", also=("progress: bool = True",)))
+class Campaign(Operation):
+    """Run all points of a scene's sweep with many workers; the same command resumes.
+
+    Example: vibroimpact campaign examples/bifurcation.toml -o bifurcation --workers 2
+    """
+
+    scene: Annotated[
+        Path,
+        Positional(
+            python="scene: SceneLike", help="Scene file (TOML), or a system (SSP), that sweeps something."
+        ),
+    ]
+    output: Annotated[
+        Path, Option("--output", "-o", python="folder: PathLike", help="Folder of the campaign.")
+    ]
+    changes: Changes = None
+    workers: Annotated[
+        int | None, Option(help="Worker processes; one for each processor by default.", min=1)
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        Option(
+            python="scheduler: str | Client | None = None",
+            help="Use the workers of this Dask scheduler (tcp://host:8786) instead.",
+        ),
+    ] = None
+    strict: Strict = False

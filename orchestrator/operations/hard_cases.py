@@ -1,0 +1,31 @@
+"""Operation `hard-cases`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+
+
+@operation("orchestrator.commands.hard_cases:show_hard_cases", Door("hard_cases", without=("names",)))
+class HardCases(Operation):
+    """Run what breaks solvers of impacts, and print each figure beside its bound.
+
+    Grazes, resonance, chatter into rest, stops that are next to rigid, units from nano to giga: each against a closed
+    form or a law of conservation. Exit code 1: a figure is wrong on this machine; what is slow alone is told.
+
+    Example: vibroimpact hard-cases --only grazing-from-above --only chatter --figure hard_cases.png
+    """
+
+    only: Annotated[
+        list[str] | None,
+        Option(
+            metavar="NAME",
+            python="only: str | Sequence[str] = ()",
+            help="A case to run; may be repeated. All without it.",
+        ),
+    ] = None
+    output: DatasetFile = None
+    figure: FigureFile = None
+    names: Annotated[bool, Option("--list", help="Print the names of the cases and run none.")] = False
+    force: Force = False

@@ -1,0 +1,23 @@
+"""Operation `lyapunov`."""
+
+from __future__ import annotations
+
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, operation
+from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDataset
+
+
+@operation("orchestrator.commands.lyapunov:show_exponents", Door("lyapunov", without=("output",)))
+class Lyapunov(Operation):
+    """Find the Lyapunov exponents of runs with impacts, from the saltation of their impacts; their sum is checked.
+
+    Of an oscillator, a chain or a beam on restitution stops; 200 impacts and more count. A scene is run first. A run
+    without exponents (no impacts, sticking) is told with its reason.
+
+    Example: vibroimpact lyapunov examples/thesis/figure_2_11.toml --set record.recorded_periods=2000
+    """
+
+    file: SceneOrDataset
+    output: DatasetFile = None
+    figure: FigureFile = None
+    changes: Changes = None
+    force: Force = False

@@ -1,0 +1,47 @@
+"""Operation `maps`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from vibroimpact.fmus.operations import (
+    DatasetFile,
+    FigureFile,
+    Force,
+    Operation,
+    Option,
+    Positional,
+    operation,
+)
+from vibroimpact.orchestrator.operations.arguments import Changes
+
+
+@operation("orchestrator.commands.maps:show_map")
+class Maps(Operation):
+    """Draw a map of a scene: impacts or states at phase 0 with its orbits, sets of grazing impacts, normal forms.
+
+    S are the impacts whose next one is a graze, W those that a graze leads to. Nordmark's map is that of the forcing
+    amplitude at its first graze.
+
+    Example: vibroimpact maps examples/thesis/figure_2_12.toml --kind discontinuity --figure sets.png
+    """
+
+    scene: Annotated[
+        Path | None,
+        Positional(help="Scene file (TOML); square-root, and nordmark with --alpha, need none."),
+    ] = None
+    kind: Annotated[
+        str, Option(help="impact, strobe, discontinuity (sets S and W), nordmark, square-root.")
+    ] = "impact"
+    start: Annotated[float | None, Option("--from", help="Of rho or d: one end of its range.")] = None
+    stop: Annotated[float | None, Option("--to", help="The other end.")] = None
+    points: Annotated[int, Option(help="Values in that range; phases of the grazes of S and W.")] = 1500
+    alpha: Annotated[float | None, Option(help="Of the Nordmark map, instead of the scene's.")] = None
+    gamma: Annotated[float | None, Option(help="Likewise.")] = None
+    restitution: Annotated[float | None, Option(help="Likewise (1).")] = None
+    slope: Annotated[float | None, Option(help="lambda of the square-root map (0.5).")] = None
+    output: DatasetFile = None
+    figure: FigureFile = None
+    changes: Changes = None
+    force: Force = False

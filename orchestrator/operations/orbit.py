@@ -1,0 +1,34 @@
+"""Operation `orbit`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, Run, SceneFile, Seed
+
+
+@operation("orchestrator.commands.orbit:show_orbits", Door("find_orbits", without=("output",)))
+class FindOrbits(Operation):
+    """Find periodic orbits of a scene, stable and unstable ones, and say what their multipliers are.
+
+    Without --impacts and --periods all orbits of one impact a period, and the orbit that a long run ends on; with
+    --seed or --from-dataset the orbit near to it. Each is nowhere beyond a stop: all maxima between its impacts are
+    found, the nearest to a stop is told.
+
+    Example: vibroimpact orbit examples/bifurcation.toml --set "sweep={}" --impacts 2 --periods 2 --figure orbits.png
+    """
+
+    scene: SceneFile
+    impacts: Annotated[int | None, Option(help="Impacts of an orbit.")] = None
+    periods: Annotated[int | None, Option(help="Forcing periods of an orbit.")] = None
+    seed: Seed = None
+    from_dataset: FromDataset = None
+    run: Run = None
+    penetrating: Annotated[
+        bool, Option("--penetrating", help="Tell orbits that pass through a stop as well.")
+    ] = False
+    output: DatasetFile = None
+    figure: FigureFile = None
+    changes: Changes = None
+    force: Force = False

@@ -1,0 +1,19 @@
+"""Operation `cancel`: a campaign of a service ends."""
+
+from __future__ import annotations
+
+from vibroimpact.fmus.operations import operation
+from vibroimpact.service.operations.arguments import Folder, Name, Url
+from vibroimpact.service.operations.packages import ServiceOperation
+
+
+@operation("service.commands.asking:cancel_campaign")
+class Cancel(ServiceOperation):
+    """Cancel a campaign; what it has computed stays with the service.
+
+    Example: vibroimpact cancel 0123456789abcdef0123456789abcdef --data service
+    """
+
+    name: Name
+    service: Url = None
+    data: Folder = None

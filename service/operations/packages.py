@@ -1,0 +1,37 @@
+"""Operations whose packages are an extra of this one: they are refused where these are missing."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import ClassVar
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.operations import Operation
+
+
+class ServiceOperation(Operation):
+    """An operation that needs packages of the extra `service`.
+
+    Attributes
+    ----------
+    needs : tuple of str
+        Modules of these packages; by default those of the client.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("httpx",)
+
+    def carry_out(self) -> None:
+        """Call the function that the operation names, once the packages are there.
+
+        Raises
+        ------
+        UsageError
+            A package is missing; nothing of the service was imported yet.
+        """
+        missing = [module for module in self.needs if find_spec(module) is None]
+        if missing:
+            raise UsageError(
+                f"expected the packages of the service, got none of {', '.join(missing)}. "
+                "Install them: pip install 'vibroimpact[service]'."
+            )
+        super().carry_out()

@@ -1,0 +1,34 @@
+"""The declared operations of each package."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+
+from vibroimpact.fmus.operations import Operation
+from vibroimpact.orchestrator.commands import table
+
+
+def declared(place: str) -> type[Operation]:
+    """Return the operation that is declared at `module:class`."""
+    module, _, name = place.partition(":")
+    found: type[Operation] = getattr(importlib.import_module(f"vibroimpact.{module}"), name)
+    return found
+
+
+OPERATIONS = {words: declared(place) for words, place in table.paths().items()}
+
+
+def of_package(package: str) -> dict[str, type[Operation]]:
+    """Return the operations that a package declares, by the words of their commands."""
+    return {
+        words: declared(place) for words, place in table.paths().items() if place.startswith(f"{package}.")
+    }
+
+
+def assert_sound(operation: type[Operation]) -> None:
+    """Assert that each argument has words, and that what the operation runs takes the operation alone."""
+    assert all(field.words.help for field in operation.fields())
+    place, _, name = operation.runs.partition(":")
+    parameters = inspect.signature(getattr(importlib.import_module(f"vibroimpact.{place}"), name)).parameters
+    assert [one.annotation for one in parameters.values()] == [operation.__name__]
