@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
+import pkgutil
 from collections.abc import Callable, Iterator
 from typing import (
     Annotated,
@@ -93,11 +93,6 @@ class Field(NamedTuple):
     default: Any
     words: Argument
 
-    @property
-    def is_required(self) -> bool:
-        """Whether it has no default."""
-        return self.default is dataclasses.MISSING
-
 
 class Door(NamedTuple):
     """The function of the Python door that does what an operation does.
@@ -133,8 +128,7 @@ class Operation:
 
     def carry_out(self) -> None:
         """Call the function that the operation names."""
-        place, _, name = self.runs.partition(":")
-        getattr(importlib.import_module(f"{ROOT}.{place}"), name)(self)
+        pkgutil.resolve_name(f"{ROOT}.{self.runs}")(self)
 
     @classmethod
     def fields(cls) -> Iterator[Field]:

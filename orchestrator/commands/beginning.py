@@ -62,10 +62,13 @@ def refuse_contradictions(options: Beginning) -> None:
     ------
     UsageError
     """
-    if options.from_dataset is None and options.run is not None:
-        raise UsageError("--run: expected --from-dataset as well, got --run alone.")
-    given = [f"--{name}" for name in ("impacts", "periods", "seed") if getattr(options, name) is not None]
-    if options.from_dataset is not None and given:
+    if options.from_dataset is None:
+        if options.run is not None:
+            raise UsageError("--run: expected --from-dataset as well, got --run alone.")
+        return
+    if given := [
+        f"--{name}" for name in ("impacts", "periods", "seed") if getattr(options, name) is not None
+    ]:
         raise UsageError(f"--from-dataset: expected it without {', '.join(given)}, which the run says.")
 
 

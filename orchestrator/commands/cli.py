@@ -12,7 +12,9 @@ import copy
 import errno
 import functools
 import gc
+import itertools
 import logging
+import operator
 import os
 import signal
 import sys
@@ -23,7 +25,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import metadata
-from itertools import takewhile
 from types import FrameType
 from typing import Annotated, Any
 
@@ -35,8 +36,8 @@ from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.printable import printable
 from vibroimpact.fmus.terminal import all_was_written, say
 from vibroimpact.fmus.wording import command_line
-from vibroimpact.orchestrator.commands.table import COMMANDS, GROUPS, PANELS
-from vibroimpact.orchestrator.commands.typer_form import add_commands
+from vibroimpact.orchestrator.commands.table import COMMANDS, GROUPS
+from vibroimpact.orchestrator.commands.typer_form import ORDER, add_commands
 
 COMMAND_GROUP = "vibroimpact.commands"
 DEBUG = "--debug"
@@ -72,8 +73,7 @@ class _Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the commands in the order of their panels; those of other packages come last."""
-        shown = [name for names in PANELS.values() for name in names]
-        return sorted(self.commands, key=[*shown, *self.commands].index)
+        return sorted(self.commands, key=[*ORDER, *self.commands].index)
 
 
 app = typer.Typer(
@@ -116,7 +116,7 @@ def _add_foreign(app: typer.Typer) -> None:
 
 def _with_called(words: Sequence[str]) -> typer.Typer:
     """Return an app with the command that is called; where it is none of this package, with all there are."""
-    named = [word for word in words if not word.startswith("-")]
+    named = list(itertools.filterfalse(operator.methodcaller("startswith", "-"), words))
     called = copy.copy(app)
     if named and named[0] in COMMANDS.keys() | GROUPS.keys():
         called.registered_commands, called.registered_groups = [], []
@@ -185,7 +185,7 @@ def _no_interrupt_is_lost() -> Iterator[None]:
 
 def _interrupt(number: int, place: FrameType | None) -> None:
     frames = (frame for frame, _ in traceback.walk_stack(place))
-    ours = takewhile(lambda frame: frame.f_code is not main.__code__, frames)
+    ours = itertools.takewhile(lambda frame: frame.f_code is not main.__code__, frames)
     if all(frame.f_code.co_filename != _IMPORTING for frame in ours):
         raise KeyboardInterrupt
     _interrupt_soon()

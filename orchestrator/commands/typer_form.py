@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
-from collections.abc import Callable, Iterator, Sequence
+import pkgutil
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from vibroimpact.fmus.operations import Operation, Positional
-from vibroimpact.fmus.operations.declaring import ROOT, Field
+from vibroimpact.fmus.operations.declaring import ROOT
 from vibroimpact.orchestrator.commands.table import COMMANDS, GROUPS, PANELS, first_lines
 
 _PANEL_OF = {name: panel for panel, names in PANELS.items() for name in names}
-_ORDER = [name for names in PANELS.values() for name in names]
+ORDER = [name for names in PANELS.values() for name in names]
+"""Commands and groups as `--help` shows them."""
 
 
 def add_commands(app: typer.Typer, words: Sequence[str] | None = None) -> None:
@@ -29,7 +31,7 @@ def add_commands(app: typer.Typer, words: Sequence[str] | None = None) -> None:
         names none, commands have their names and first lines alone. Without it all are added whole.
     """
     called = words[0] if words else ""
-    for name in [called] if called in _ORDER else _ORDER:
+    for name in [called] if called in ORDER else ORDER:
         if name in GROUPS:
             _add_group(app, name, None if words is None else words[1:])
         else:
@@ -39,7 +41,7 @@ def add_commands(app: typer.Typer, words: Sequence[str] | None = None) -> None:
 
 def _add_group(app: typer.Typer, name: str, words: Sequence[str] | None) -> None:
     group = GROUPS[name]
-    form: type[TyperGroup] | None = _found(group.form) if group.form else None
+    form: type[TyperGroup] | None = pkgutil.resolve_name(f"{ROOT}.{group.form}") if group.form else None
     inner = typer.Typer(no_args_is_help=True, help=group.words, cls=form)
     # a group of its own form looks at all of its commands
     called = words[0] if words and form is None else ""
@@ -52,7 +54,7 @@ def _add_group(app: typer.Typer, name: str, words: Sequence[str] | None) -> None
 
 def _add(app: typer.Typer, name: str, place: str, panel: str | None, words: str = "") -> None:
     if place:
-        app.command(name, rich_help_panel=panel)(as_function(_found(place)))
+        app.command(name, rich_help_panel=panel)(as_function(pkgutil.resolve_name(f"{ROOT}.{place}")))
     else:
         app.command(name, help=first_lines()[words or name], rich_help_panel=panel)(_not_called)
 
@@ -61,33 +63,24 @@ def _not_called() -> None:
     """Stand for a command that is not called."""
 
 
-def _found(place: str) -> Any:
-    module, _, name = place.partition(":")
-    return getattr(importlib.import_module(f"{ROOT}.{module}"), name)
-
-
 def as_function(declared: type[Operation]) -> Callable[..., None]:
     """Return a function that carries an operation out, with the signature that typer reads."""
 
     def command(**given: Any) -> None:
         declared(**given).carry_out()
 
-    parameters = list(_parameters(declared))
-    command.__doc__ = inspect.getdoc(declared)
-    command.__annotations__ = {one.name: one.annotation for one in parameters}
+    annotated: Any = Annotated
+    parameters, annotations = [], {}
+    for name, kind, default, words in declared.fields():
+        form = typer.Argument if isinstance(words, Positional) else typer.Option
+        said = form(*words.names, help=words.help, metavar=words.metavar, min=words.min, max=words.max)
+        annotations[name] = annotated[kind, said]
+        given_by = inspect.Parameter.empty if default is MISSING else default
+        parameters.append(
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, default=given_by, annotation=annotations[name]
+            )
+        )
+    command.__doc__, command.__annotations__ = inspect.getdoc(declared), annotations
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return command
-
-
-def _parameters(declared: type[Operation]) -> Iterator[inspect.Parameter]:
-    annotated: Any = Annotated
-    for field in declared.fields():
-        kind = annotated[field.type, _words(field)]
-        default = inspect.Parameter.empty if field.is_required else field.default
-        yield inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-
-
-def _words(field: Field) -> Any:
-    words = field.words
-    form = typer.Argument if isinstance(words, Positional) else typer.Option
-    return form(*words.names, help=words.help, metavar=words.metavar, min=words.min, max=words.max)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
+import pkgutil
 
 from vibroimpact.fmus.operations import Operation
 from vibroimpact.orchestrator.commands import table
@@ -11,8 +11,7 @@ from vibroimpact.orchestrator.commands import table
 
 def declared(place: str) -> type[Operation]:
     """Return the operation that is declared at `module:class`."""
-    module, _, name = place.partition(":")
-    found: type[Operation] = getattr(importlib.import_module(f"vibroimpact.{module}"), name)
+    found: type[Operation] = pkgutil.resolve_name(f"vibroimpact.{place}")
     return found
 
 
@@ -29,6 +28,5 @@ def of_package(package: str) -> dict[str, type[Operation]]:
 def assert_sound(operation: type[Operation]) -> None:
     """Assert that each argument has words, and that what the operation runs takes the operation alone."""
     assert all(field.words.help for field in operation.fields())
-    place, _, name = operation.runs.partition(":")
-    parameters = inspect.signature(getattr(importlib.import_module(f"vibroimpact.{place}"), name)).parameters
+    parameters = inspect.signature(pkgutil.resolve_name(f"vibroimpact.{operation.runs}")).parameters
     assert [one.annotation for one in parameters.values()] == [operation.__name__]

@@ -8,9 +8,9 @@ a dataset its variables and attributes.
 from __future__ import annotations
 
 import enum
-import importlib
 import inspect
 import json
+import pkgutil
 import re
 import sys
 import typing
@@ -130,8 +130,7 @@ def first_lines() -> str:
 
 
 def _declared(place: str) -> type:
-    module, _, name = place.partition(":")
-    found: type = getattr(importlib.import_module(f"vibroimpact.{module}"), name)
+    found: type = pkgutil.resolve_name(f"vibroimpact.{place}")
     return found
 
 

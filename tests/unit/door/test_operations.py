@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
+from dataclasses import MISSING
 
 import pytest
 from support import public_names
@@ -22,7 +23,7 @@ def form(field: Field) -> str:
     if field.words.python is not None:
         return field.words.python
     kind = field.type.__name__ if inspect.isclass(field.type) else str(field.type)
-    default = "" if field.is_required else f" = {field.default!r}"
+    default = "" if field.default is MISSING else f" = {field.default!r}"
     return f"{field.name}: {kind.replace('pathlib.', '')}{default}"
 
 
