@@ -12,7 +12,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_path, prepared_scene
 from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
-from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
+from vibroimpact.orchestrator.run.progress import Progress, shown_progress
 from vibroimpact.orchestrator.ssp import refuse_system_elsewhere
 
 

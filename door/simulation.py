@@ -10,9 +10,10 @@ import xarray as xr
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene, prepared_scene, scene_with_modes
-from vibroimpact.orchestrator.campaign import SceneCost, run_scene
+from vibroimpact.orchestrator.campaign import SceneCost
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
-from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
+from vibroimpact.orchestrator.run.progress import Progress, shown_progress
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.returned import ONE_AT_A_TIME, in_memory
 
 

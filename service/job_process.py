@@ -20,8 +20,9 @@ from urllib.parse import urlsplit
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError, VibroimpactError, WorkersGoneError
-from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign, run_scene
-from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
+from vibroimpact.orchestrator.run.progress import Progress
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
 from vibroimpact.service.child import FULL, SHORT, begin_as_child, say

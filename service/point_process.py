@@ -26,18 +26,11 @@ from vibroimpact.analysis.dataset import (
 from vibroimpact.analysis.dataset.schema import attributes_of, known_unit, unit_in
 from vibroimpact.analysis.files.opening import opened_netcdf
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import (
-    CARRYING,
-    DEFAULT_RUNNER,
-    BranchPoint,
-    Chunk,
-    State,
-    points_of,
-    run_points,
-)
 from vibroimpact.orchestrator.campaign.manifest import read_manifest
 from vibroimpact.orchestrator.campaign.rounds import Rounds, adaptive_axes
-from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run.points import BranchPoint, State, columns_of_points
+from vibroimpact.orchestrator.run.runner import CARRYING
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.models import TimeSeries
@@ -73,11 +66,8 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
     place, branch = _place_of(scene, results, run)
     start = None if place.first else _start_of(results, branch, run)
     watched = _watched(scene, place)
-    runner = named_runner(watched, DEFAULT_RUNNER)
-    try:
-        (record,), _ = run_points(watched, runner, [place], start)
-    finally:
-        runner.close()
+    with open_scene(watched) as runner:
+        record = runner.record_of(place.point.values, place.start if place.first else start)
     series = watched.record.time_series
     names = series.variables if series is not None else ()
     if watched.general is not None:
@@ -119,8 +109,7 @@ def _place_of(scene: Scene, results: Path, run: int) -> tuple[BranchPoint, Branc
         branch = next((one for one, end in ends if run < end), None)
     if branch is None:
         raise UsageError(f"run: expected a point of this campaign, got {run}.")
-    (place,) = points_of([branch], Chunk(0, run, run + 1))
-    return place, branch
+    return columns_of_points([branch], run, run + 1).place(0), branch
 
 
 def _start_of(results: Path, branch: Branch, run: int) -> State | None:

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from vibroimpact.analysis import open_dataset
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.commands.cli import main
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]

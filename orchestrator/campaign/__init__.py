@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.campaign import CampaignInterrupted, CampaignReport, run_campaign
     from vibroimpact.orchestrator.campaign.check import SceneCost, cost_of
-    from vibroimpact.orchestrator.campaign.single_run import run_scene
 
-__all__ = ["CampaignInterrupted", "CampaignReport", "SceneCost", "cost_of", "run_campaign", "run_scene"]
-_HOMES = {"run_scene": "single_run", "cost_of": "check", "SceneCost": "check"}
+__all__ = ["CampaignInterrupted", "CampaignReport", "SceneCost", "cost_of", "run_campaign"]
+_HOMES = {"cost_of": "check", "SceneCost": "check"}
 
 
 def __getattr__(name: str) -> Any:

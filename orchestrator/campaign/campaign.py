@@ -66,11 +66,11 @@ from vibroimpact.orchestrator.campaign.parts import (
     unfit_parts,
 )
 from vibroimpact.orchestrator.campaign.pool import WorkerPool
-from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 from vibroimpact.orchestrator.scene.sweep import run_count

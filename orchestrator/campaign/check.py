@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, BranchPoint, dataset_of, run_point
-from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.orchestrator.run.dataset import dataset_of
+from vibroimpact.orchestrator.run.points import independent_points
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
-from vibroimpact.orchestrator.scene.sweep import Point, dimensions, most_points, run_count
+from vibroimpact.orchestrator.scene.sweep import dimensions, most_points, run_count
 
 MOST_TRIAL_SECONDS = 20.0
 """Wall time after which the trial point is given up, s."""
@@ -156,15 +156,12 @@ def _tried(scene: Scene) -> Trial:
     limited = scene.model_copy(
         update={"execution": scene.execution.model_copy(update={"deadline": deadline})}
     )
-    point = Point(0, {axis.key: axis.values[len(axis.values) // 2] for axis in scene.sweep})
-    runner = named_runner(limited, DEFAULT_RUNNER)
-    try:
-        record = run_point(limited, runner, point, None)
+    values = {axis.key: axis.values[len(axis.values) // 2] for axis in scene.sweep}
+    with open_scene(limited) as runner:
+        record = runner.record_of(values)
         if record.seconds < LONG_ENOUGH:
-            record = run_point(limited, runner, point, None)
-    finally:
-        runner.close()
-    trial = _trial(limited, point, record, given_up=deadline != scene.execution.deadline)
+            record = runner.record_of(values)
+    trial = _trial(limited, values, record, given_up=deadline != scene.execution.deadline)
     if trial.given_up or not goes_by_lanes(scene):
         return trial
     together = int(MOST_TRIAL_SECONDS / max(record.seconds, MOST_TRIAL_SECONDS / LANE_TRIALS))
@@ -173,41 +170,28 @@ def _tried(scene: Scene) -> Trial:
 
 def _lane_seconds(scene: Scene, count: int) -> float:
     """Return what one of so many points, spread over the sweep, takes when they run in lanes, s."""
-    # what finds points their lanes takes time to load, and only these scenes need it
-    from vibroimpact.orchestrator.run.many_points.lanes_rows import LaneValues, run_in_lanes
-
     share = np.arange(count)
     values: dict[str, NDArray[np.float64]] = {}
     for number, members in enumerate(dimensions(scene.sweep)):
         place = (share * GOLDEN ** (number + 1) % 1.0 * len(members[0].values)).astype(np.int64)
         values |= {axis.key: np.array(axis.values)[place] for axis in members}
-    first = np.ones(count, dtype=np.bool_)
-
-    def alone(place: int, given: tuple[float, ...] | None) -> RunRecord:
-        return run_point(
-            scene, runner, Point(0, {key: float(each[place]) for key, each in values.items()}), given
-        )
-
-    runner = named_runner(scene, DEFAULT_RUNNER)
-    try:
-        loop = loop_of(scene, runner)
-        assert loop is not None  # its points go by lanes
+    points = independent_points(values, count)
+    with open_scene(scene) as runner:
         for _ in range(2):  # the first call of a process is slower than all that follow
             began = time.perf_counter()
-            columns, _ = run_in_lanes(loop, LaneValues(values, first, {}), began + MOST_TRIAL_SECONDS, alone)
+            columns, _ = runner.rows(points, None, began + MOST_TRIAL_SECONDS)
             seconds = time.perf_counter() - began
             if seconds > LONG_ENOUGH:
                 break
         return seconds / len(columns)
-    finally:
-        runner.close()
 
 
-def _trial(scene: Scene, point: Point, record: RunRecord, *, given_up: bool) -> Trial:
-    dataset = dataset_of(scene, [BranchPoint(point, Direction.independent, True)], [record], {})
+def _trial(scene: Scene, values: Mapping[str, float], record: RunRecord, *, given_up: bool) -> Trial:
+    columns = {key: np.array([value]) for key, value in values.items()}
+    dataset = dataset_of(scene, independent_points(columns, 1), [record], {})
     [outcome], [message] = dataset.outcome.values, dataset.message.values
     return Trial(
-        point.values,
+        values,
         Outcome(outcome),
         str(message),
         record.seconds,

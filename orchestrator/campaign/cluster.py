@@ -37,7 +37,7 @@ from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.processors import processor_count
-from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.run.progress import Progress
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""

@@ -30,7 +30,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import CARRYING, MANIFEST, Chunk, State, empty_part
+from vibroimpact.orchestrator.campaign.chunks import MANIFEST, Chunk
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
     carried_manifest,
@@ -41,7 +41,14 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_content,
 )
 from vibroimpact.orchestrator.campaign.parts import NO_RUNS, Note, StoredPart, list_parts, own_files
-from vibroimpact.orchestrator.run.dataset import coordinate_names, stored_samples, with_constants_of
+from vibroimpact.orchestrator.run.dataset import (
+    coordinate_names,
+    empty_dataset,
+    stored_samples,
+    with_constants_of,
+)
+from vibroimpact.orchestrator.run.points import State
+from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, SweepAxis, dimensions, run_count
 
@@ -233,7 +240,7 @@ def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
 
 def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) -> xr.Dataset:
     """Return rows as the new scene's own runs would have them: names, attributes and coordinates."""
-    like = empty_part(new)
+    like = empty_dataset(new)
     values: dict[str, NDArray[Any]] = {"run_index": runs.astype(np.int32), **_coordinates(new, runs)}
     sampled = dict(zip(stored_samples(new), stored_samples(old), strict=True))
     variables: dict[str, Any] = {}
@@ -322,7 +329,7 @@ def read_kept(path: Path, scene: Scene) -> Kept:
 
 
 def _carried(rows: xr.Dataset, begin: int, stop: int) -> State | None:
-    """Return the state that the runs from the beginning of a branch hand on, as `chunks.run_points` finds it."""
+    """Return the state that the runs from the beginning of a branch hand on, as `Runner.rows` finds it."""
     states = final_states(rows, slice(begin, stop))
     outcome = rows.outcome.values[begin:stop]
     # A run that was marked for its values has handed on its state; one that failed has none.

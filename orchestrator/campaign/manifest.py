@@ -21,8 +21,8 @@ from typing import Any, NoReturn
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.provenance import git_commit, provenance, versions
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
+from vibroimpact.orchestrator.run.provenance import git_commit, provenance, versions
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 FORMAT = 2

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, read_flat, refuse_unlike, take_runs
 from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, Work, compute_again
+from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, compute_again
 from vibroimpact.orchestrator.campaign.extension import final_states, without_empty_periods
 from vibroimpact.orchestrator.campaign.pool import WorkerPool
+from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 

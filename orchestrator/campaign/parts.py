@@ -33,11 +33,10 @@ from vibroimpact.orchestrator.campaign.chunks import (
     CARRIED_STATE,
     MANIFEST,
     Chunk,
-    State,
     carried_state,
-    empty_part,
 )
-from vibroimpact.orchestrator.run.dataset import with_constants_of
+from vibroimpact.orchestrator.run.dataset import empty_dataset, with_constants_of
+from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
 
 _PART = r"branch-(\d{6,})_runs-(\d{10,})-(\d{10,})\.nc"
@@ -157,7 +156,7 @@ def compact(parts: Sequence[Path], target: Path, scene: Scene, attrs: Mapping[st
 
 def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str]]:
     """Yield the parts that cannot be read, or that are no parts of a scene, each with the reason."""
-    like = empty_part(scene)
+    like = empty_dataset(scene)
     for path in parts:
         try:
             part = read_flat(path)

@@ -18,7 +18,7 @@ from distributed.scheduler import KilledWorker
 
 from vibroimpact.fmus.errors import CampaignError, UsageError, WorkersGoneError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.run.progress import Progress
 
 WORKERLESS_SECONDS = 30.0
 """How long a campaign waits for a first or a new worker before it gives up, s."""

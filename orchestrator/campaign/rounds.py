@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, merge_datasets, read_flat, take_runs
 from vibroimpact.analysis.jumps import RunClasses, classes_of
-from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State, points_of
+from vibroimpact.orchestrator.campaign.chunks import Chunk, points_of
 from vibroimpact.orchestrator.campaign.extension import final_states
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.refinement import Known, Refined, cut_cells, halved_intervals
 from vibroimpact.orchestrator.run.dataset import coordinate_names
+from vibroimpact.orchestrator.run.points import State
+from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Points, SweepAxis, SweepDirection, expand, run_count
 
@@ -127,7 +129,7 @@ class Rounds:
     def _is_of(self, rows: xr.Dataset, branches: Sequence[Branch]) -> bool:
         runs = rows.run_index.values
         points = points_of(branches, Chunk(0, int(runs[0]), int(runs[-1]) + 1))
-        wanted = np.array([[place.point.values[key] for key in self._names] for place in points])
+        wanted = np.stack([points.values[key] for key in self._names], axis=1)
         return bool(np.array_equal(wanted, self._values(rows)))
 
     def _values(self, rows: xr.Dataset) -> NDArray[np.float64]:

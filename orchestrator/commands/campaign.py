@@ -10,10 +10,10 @@ from vibroimpact.analysis.dataset.outputs import refuse_folder
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_workers
-from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
 from vibroimpact.orchestrator.commands.preparing import prepared
 from vibroimpact.orchestrator.operations.campaign import Campaign
+from vibroimpact.orchestrator.run.progress import shown_progress
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
 

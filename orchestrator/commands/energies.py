@@ -18,12 +18,12 @@ from vibroimpact.analysis.orbits.energies import residual_restitution
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
-from vibroimpact.orchestrator.campaign import run_scene
-from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.operations.energies import Energies
 from vibroimpact.orchestrator.orbits import impacting_body
 from vibroimpact.orchestrator.orbits.energies import energies
+from vibroimpact.orchestrator.run.progress import shown_progress
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.ssp import opened_scene
 
 _MOST_SHOWN = 4

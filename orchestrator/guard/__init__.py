@@ -6,9 +6,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.guard.guarded import GuardedRunner, make_runner
+    from vibroimpact.orchestrator.guard.guarded import GuardedRunner
 
-__all__ = ["GuardedRunner", "make_runner"]
+__all__ = ["GuardedRunner"]
 
 
 def __getattr__(name: str) -> Any:

@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.guard.pipe import (
     packed,
     receive,
 )
-from vibroimpact.orchestrator.run import Runner, identity_of, open_runner
+from vibroimpact.orchestrator.run import Runner, open_runner
 
 #: How often the child looks at its parent and at what it is doing itself, s: less than its parent waits for it (GRACE).
 LOOK = 0.25
@@ -148,7 +148,7 @@ def main(bell: int | None) -> None:
         answers.put(Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
     gc.freeze()  # what is there stays there: no collection need look at it
-    answers.put(identity_of(runner))
+    answers.put(runner.identity)
     while (batch := receive(orders)) is not None:
         _serve(runner, batch, notes, answers)
     runner.close()

@@ -28,14 +28,17 @@ from vibroimpact.fmus.python_child import ending
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.guard.pipe import BATCH_TIME, MOST_POINTS, Failure, Order, PointTask
 from vibroimpact.orchestrator.guard.point_process import HAS_BELL, PointProcess
-from vibroimpact.orchestrator.run import Runner, RunnerIdentity, open_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.points import PointColumns, State
+from vibroimpact.orchestrator.run.runner import Rows, Runner, RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
 
 #: Wall time that a guarded point may take where the scene names no deadline, s.
 DEFAULT_DEADLINE = 300.0
 #: What a child may take beyond the deadline to end the point by itself, s.
 GRACE = 0.5
+#: Points that are announced together, in batches that are a small part of them.
+ANNOUNCED = 16 * MOST_POINTS
 #: Starting Python and loading the FMUs, s.
 START_TIME = 60.0
 #: Calls that end the life of the point before.
@@ -56,8 +59,8 @@ class _Loss:
     seconds: float
 
 
-class GuardedRunner:
-    """Runs points of a scene in a guarded child process, whose runner gets `execution`; the interface of any runner.
+class GuardedRunner(Runner):
+    """Runs points of a scene in a guarded child process, whose runner gets `execution`.
 
     Raises
     ------
@@ -66,7 +69,7 @@ class GuardedRunner:
     """
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
-        self._scene = scene
+        self.scene = scene
         self._wanted = execution
         self._folder = ScratchFolder("guard")
         self._child: PointProcess | None = None
@@ -92,7 +95,7 @@ class GuardedRunner:
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
         self._notes.begin()
-        self._child = PointProcess(Order(self._scene, self._wanted, str(path), self._noting))
+        self._child = PointProcess(Order(self.scene, self._wanted, str(path), self._noting))
         try:
             (answer,), _ = self._child.answers(START_TIME)
         except TimeoutError:
@@ -104,6 +107,20 @@ class GuardedRunner:
         if isinstance(answer, Failure):
             raise (ComponentFileError if answer.misuse else ComponentError)(answer.message)
         raise ComponentError(self._what_happened(f"the process {ending(code)}"))
+
+    def rows(self, points: PointColumns, start: State | None = None, deadline: float = math.inf) -> Rows:
+        """Run points in batches where none waits for the one before, see `Runner.rows`."""
+        if start is not None or not points.are_independent:
+            return super().rows(points, start, deadline)
+        records: list[RunRecord] = []
+        for first in range(0, len(points), ANNOUNCED):
+            places = list(points.chosen(slice(first, first + ANNOUNCED)).places())
+            self.announce([(place.point.values, place.start) for place in places])
+            found, _ = self.rows_one_by_one(places, None, deadline)
+            records += found
+            if len(found) < len(places) or time.perf_counter() > deadline:
+                break
+        return records, None
 
     def announce(self, points: Sequence[PointTask]) -> None:
         """Say which points `run` will be asked for next, with the very objects that it will be given."""
@@ -129,7 +146,7 @@ class GuardedRunner:
         if isinstance(found, Failure):
             raise ComponentError(found.message)
         if isinstance(found, _Loss):
-            return empty_record(self._scene, found.outcome, found.message, found.seconds)
+            return empty_record(self.scene, found.outcome, found.message, found.seconds)
         return found
 
     def _batch_from(self, point: PointTask) -> list[PointTask]:
@@ -225,7 +242,7 @@ class GuardedRunner:
         return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
 
     def _file_of(self, instance: str) -> str:
-        components = self._scene.general.components if self._scene.general is not None else ()
+        components = self.scene.general.components if self.scene.general is not None else ()
         return next((str(spec.fmu) for spec in components if spec.name == instance), "")
 
     def close(self) -> None:
@@ -238,15 +255,3 @@ class GuardedRunner:
 def _are_same(one: PointTask, other: PointTask) -> bool:
     """Whether two points are one and the same: values may be equal and differ in the sign of a zero."""
     return one[0] is other[0] and one[1] == other[1]
-
-
-def make_runner(scene: Scene, *, execution: str = "auto") -> Runner:
-    """Return the runner of a scene, in a guarded child process where the scene asks for it.
-
-    Raises
-    ------
-    SceneError, ComponentError
-        The scene cannot run this way, or a component cannot be loaded.
-    """
-    guarded = scene.general.guard if scene.general is not None else scene.execution.guard
-    return GuardedRunner(scene, execution=execution) if guarded else open_runner(scene, execution)

@@ -16,7 +16,6 @@ import xarray as xr
 from vibroimpact.analysis.dataset.results import described
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.wording import option
-from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase
 from vibroimpact.orchestrator.hard_cases.finding import CASES as FINDING
 from vibroimpact.orchestrator.hard_cases.impacts import CASES as IMPACTS
@@ -26,6 +25,7 @@ from vibroimpact.orchestrator.hard_cases.rests import CASES as RESTS
 from vibroimpact.orchestrator.hard_cases.scales import CASES as SCALES
 from vibroimpact.orchestrator.hard_cases.several import CASES as SEVERAL
 from vibroimpact.orchestrator.hard_cases.yielding import CASES as YIELDING
+from vibroimpact.orchestrator.run.provenance import git_commit, versions
 
 CASES: tuple[HardCase, ...] = (
     *(*FINDING, *IMPACTS, *PLACES, *RESTS),

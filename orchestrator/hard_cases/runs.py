@@ -51,7 +51,7 @@ def run(**tables: Any) -> RunRecord:
 def impacts_of_points(how: str, **tables: Any) -> list[NDArray[np.float64]]:
     """Return times and speeds of the impacts of each point of a sweep, shape (impact, 2), run in this way."""
     from vibroimpact.analysis.dataset import read_flat
-    from vibroimpact.orchestrator.campaign import run_scene
+    from vibroimpact.orchestrator.running import run_scene
 
     document = {"scene": {"units": "nondimensional"}, "execution": {"how": how}, **tables}
     with TemporaryDirectory() as folder:

@@ -19,7 +19,7 @@ from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.many_points.lanes_rows import run_prepared_in_lanes
-from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints, loop_of
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints
 from vibroimpact.orchestrator.run.many_points.loop_rows import run_loop
 from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.run.point import PointRunner
@@ -71,7 +71,7 @@ class BodyFlow:
         scene = self.scene.with_values({"record": record, **limits})
         by_lanes = self.scene.execution.how == "auto" and may_go_by_lanes(scene)
         self._runners.append(PointRunner(scene, execution="lanes" if by_lanes else "fused"))
-        loop = loop_of(scene, self._runners[-1])
+        loop = self._runners[-1].loop
         if loop is None:
             raise UsageError(
                 f"{self.scene.source}: basins: expected a body without a measuring chain, got one with it."

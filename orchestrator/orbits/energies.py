@@ -21,8 +21,8 @@ from vibroimpact.analysis.orbits.energies import (
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, place_of, scene_of, why_without_orbit
+from vibroimpact.orchestrator.run.progress import Progress
 
 _OF_MODES: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], Floats]]] = {
     "residual_energy": ("J", "work of the force less loss to damping", lambda e: e.residual),

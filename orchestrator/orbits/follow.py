@@ -26,12 +26,12 @@ from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollowe
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import orbit_of_run
 from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
+from vibroimpact.orchestrator.run.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 

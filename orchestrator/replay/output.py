@@ -17,11 +17,11 @@ from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.replay_dataset import comparison_dataset
 from vibroimpact.analysis.replay.trust import Verdict
 from vibroimpact.fmus.printable import printable
-from vibroimpact.orchestrator.campaign.provenance import provenance
 from vibroimpact.orchestrator.replay.drive import DRIVEN_UNITS
 from vibroimpact.orchestrator.replay.fit import ReplayFit
 from vibroimpact.orchestrator.replay.replayer import Motion, Replayer, replay_table
 from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.text import text_with_values
 

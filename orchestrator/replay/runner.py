@@ -23,11 +23,12 @@ from vibroimpact.orchestrator.replay.replayer import (
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.run.parameters import most_elements, padded_state
 from vibroimpact.orchestrator.run.point import ENGINE, built_for
+from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
 
-class ReplayRunner:
+class ReplayRunner(Runner):
     """Runs the replays of one scene; each recording is opened once in a process.
 
     Parameters
@@ -40,7 +41,7 @@ class ReplayRunner:
     Attributes
     ----------
     execution, engine, instruction_set
-        As of `runner.PointRunner`.
+        As of `run.runner.Runner`.
     fmu_hashes : dict of str to str
         SHA-256 of each component's FMU and of each recording: a campaign never mixes two versions of either.
     """
@@ -50,7 +51,7 @@ class ReplayRunner:
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self.execution = "fused" if execution == "auto" else execution
         self.instruction_set = platform.machine()
-        self._scene = scene
+        self.scene = scene
         count = max(1, len(replay_table(scene).recordings))
         self._paths = [recording_of(scene, number) for number in range(1, count + 1)]
         recordings = {f"recording {path.name}": _sha256(path) for path in self._paths}
@@ -77,7 +78,7 @@ class ReplayRunner:
         """
         began = time.perf_counter()
         numbers = {key: value for key, value in values.items() if key != RECORDING_KEY}
-        scene = self._scene.at(numbers) if numbers else self._scene
+        scene = self.scene.at(numbers) if numbers else self.scene
         replayer = self._replayer(int(values.get(RECORDING_KEY, 1.0)), scene)
         motion = replayer.simulate(numbers)
         comparisons = compare_motion(replayer, motion)
@@ -90,7 +91,7 @@ class ReplayRunner:
         # what was not scored is the same for all points; an alignment that is doubtful is not
         doubts = [f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks]
         told = [*motion.warnings, *doubts]
-        impacts = self._scene.record.impacts
+        impacts = self.scene.record.impacts
         return RunRecord(
             outcome=Outcome.ok,
             message="; ".join(told),
@@ -99,7 +100,7 @@ class ReplayRunner:
             final_displacement=displacement,
             final_velocity=velocity,
             seconds=seconds,
-            final_state=padded_state(state, most_elements(self._scene)),
+            final_state=padded_state(state, most_elements(self.scene)),
             scores=np.array([_score_row(comparison) for comparison in comparisons]) if comparisons else None,
         )
 

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.run.opening import (
-    OTHER_ENGINE,
-    AnnouncedRunner,
-    Runner,
-    RunnerIdentity,
-    identity_of,
-    named_runner,
-    open_runner,
-)
+from vibroimpact.orchestrator.run.opening import named_runner, open_runner
 from vibroimpact.orchestrator.run.point import PointRunner
+from vibroimpact.orchestrator.run.runner import OTHER_ENGINE, Runner, RunnerIdentity
 from vibroimpact.orchestrator.run.session import Session
 
 __all__ = [
     "OTHER_ENGINE",
-    "AnnouncedRunner",
     "PointRunner",
     "Runner",
     "RunnerIdentity",
     "Session",
-    "identity_of",
     "named_runner",
     "open_runner",
 ]

@@ -8,51 +8,47 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import (
     RESERVED_NAMES,
-    Direction,
+    Outcome,
     RunRecord,
     build_dataset,
     file_names,
+    marked,
     with_constants,
 )
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
-from vibroimpact.orchestrator.run.empty_record import sample_variables
+from vibroimpact.orchestrator.run.empty_record import empty_record, sample_variables
 from vibroimpact.orchestrator.run.measuring.conversion import channel_attributes, converted_records
+from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
-from vibroimpact.orchestrator.scene.sweep import shared_dimensions
+from vibroimpact.orchestrator.scene.sweep import expand, shared_dimensions
 
 EXTREMA = ("displacement_max", "displacement_min")
 STROBE = ("strobe_displacement", "strobe_velocity")
 FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1", "mode": "N"}
 
 
-def dataset_of_runs(
+def dataset_of(
     scene: Scene,
-    values: Mapping[str, NDArray[np.float64]],
-    directions: Sequence[Direction] | NDArray[np.int8],
-    indices: Sequence[int] | NDArray[np.int64],
+    points: PointColumns,
     records: Sequence[RunRecord] | RunColumns,
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return the one-dimensional dataset of runs.
+    """Return the one-dimensional dataset of points and what became of them; those with impossible values are marked.
 
     Parameters
     ----------
     scene : Scene
         The scene they belong to.
-    values : mapping of str to ndarray, shape (run,)
-        Swept values by key.
-    directions, indices : sequence
-        Direction of the sweep and place in the campaign of each run.
+    points : PointColumns
     records : sequence of RunRecord, or RunColumns
         What became of each.
     attrs : mapping
@@ -60,12 +56,12 @@ def dataset_of_runs(
     """
     names = coordinate_names(scene)
     if scene.channels and not isinstance(records, RunColumns):
-        records = converted_records(scene, values, directions, records)
+        records = converted_records(scene, points.values, points.direction, records)
     dataset = build_dataset(
         records,
-        coordinates={name: values[key] for key, name in names.items()},
-        direction=directions,
-        run_index=np.array(indices),
+        coordinates={name: points.values[key] for key, name in names.items()},
+        direction=points.direction,
+        run_index=points.index,
         sample_variables=sample_variables(scene),
         units=scene.units,
         attrs=attrs,
@@ -80,7 +76,19 @@ def dataset_of_runs(
         dataset[
             dict(zip(sample_variables(scene), stored_samples(scene), strict=True))[name]
         ].attrs |= attributes
-    return _described(dataset, scene, names)
+    return marked(_described(dataset, scene, names))
+
+
+def empty_dataset(scene: Scene) -> xr.Dataset:
+    """Return the dataset of one run of a scene that has no results: its names, dimensions and attributes."""
+    point = columns_of_points(expand(scene), 0, 1)
+    return dataset_of(scene, point, [empty_record(scene, Outcome.error, "", 0.0)], {})
+
+
+def tally(dataset: xr.Dataset) -> dict[str, int]:
+    """Count the runs of each outcome."""
+    values, counts = np.unique(dataset.outcome.values, return_counts=True)
+    return {Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)}
 
 
 def _described(dataset: xr.Dataset, scene: Scene, names: Mapping[str, str]) -> xr.Dataset:

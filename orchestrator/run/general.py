@@ -24,6 +24,7 @@ from vibroimpact.orchestrator.run.record import (
     ImpactLimitReached,
     in_time_order,
 )
+from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
 
@@ -32,7 +33,7 @@ NO_ROWS = np.empty((0, 3))
 COUNTED_FROM_ONE = np.array([0.0, 0.0, 1.0])
 
 
-class GeneralRunner:
+class GeneralRunner(Runner):
     """Runs points of one general scene in this process, with component instances that are used again.
 
     Parameters
@@ -67,7 +68,7 @@ class GeneralRunner:
             raise SceneError([problem])
         self.execution = "coupled"
         self.instruction_set = platform.machine()
-        self._scene, self._general = scene, scene.general
+        self.scene, self._general = scene, scene.general
         self._log, self._wrap = log, wrap
         self._deadline = Deadline()
         self._build()
@@ -112,7 +113,7 @@ class GeneralRunner:
             A component fails; the error names instance, function and time.
         """
         began = time.perf_counter()
-        scene = self._scene.at(values) if values else self._scene
+        scene = self.scene.at(values) if values else self.scene
         if self._broken:
             self._rebuild()
         self._broken = True  # until this run ends well: after an error FMI allows little but to free
@@ -251,7 +252,7 @@ class GeneralRunner:
             samples=None if self._sampler is None else self._sampler.rows,
             seconds=seconds,
             events=in_time_order(np.concatenate([NO_ROWS, *self._events]))
-            if self._scene.record.impacts
+            if self.scene.record.impacts
             else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,
             loop_residual=self._importer.loops.residual if self._importer.loops.names else None,

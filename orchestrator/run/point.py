@@ -11,7 +11,8 @@ import platform
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.many_points.loop import PointLoop, loop_of
 from vibroimpact.orchestrator.run.parameters import (
     FMU_NAMES,
     float_parameters,
@@ -30,6 +32,7 @@ from vibroimpact.orchestrator.run.parameters import (
     state_variables,
     without_padding,
 )
+from vibroimpact.orchestrator.run.points import PointColumns, State
 from vibroimpact.orchestrator.run.record import (
     ROW_PERIOD,
     DeadlineReached,
@@ -37,11 +40,18 @@ from vibroimpact.orchestrator.run.record import (
     RecordedBody,
     RunEnded,
 )
+from vibroimpact.orchestrator.run.runner import Rows, Runner
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan, few_samples_message
+from vibroimpact.orchestrator.run.window import (
+    TWO_PI,
+    late_message,
+    limit_message,
+    no_load_message,
+    recorded_window,
+)
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
-from vibroimpact.orchestrator.scene.models import Record
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
@@ -52,12 +62,10 @@ ENGINE = 6
 SAMPLES_OF_A_BLOCK = 16_384
 """Samples that are taken by one call, between two looks at the clock and for signals that C does not make itself."""
 
-TWO_PI = 2.0 * math.pi
 _DURATION = IMPACT_COLUMNS.index("impact_duration")
-Numbers = TypeVar("Numbers", float, NDArray[np.float64])
 
 
-class PointRunner:
+class PointRunner(Runner):
     """Runs points of one scene in this process, with component instances that are used again.
 
     Parameters
@@ -89,7 +97,7 @@ class PointRunner:
         chosen = "lanes" if goes_by_lanes(scene) else "fused"
         self.execution = chosen if execution == "auto" else execution
         self.instruction_set = platform.machine()
-        self._scene, self._wrap = scene, wrap
+        self.scene, self._wrap = scene, wrap
         self._plan = TimeSeriesPlan(scene)
         self._open(scene)
         self.fmu_hashes = self.driver.hashes
@@ -128,13 +136,31 @@ class PointRunner:
             The body refuses its parameters or fails.
         """
         began = time.perf_counter()
-        scene = self._scene.at(values) if values else self._scene
+        scene = self.scene.at(values) if values else self.scene
         self._reopen_if_other(scene)
         run = _Run(scene, self.driver, self._plan, without_padding(start, len(state_variables(scene)) // 2))
         outcome, message = run.run()
         message = message or "; ".join(self.driver.warnings)
         record = run.record(outcome, message, time.perf_counter() - began)
-        return replace(record, final_state=padded_state(record.final_state, most_elements(self._scene)))
+        return replace(record, final_state=padded_state(record.final_state, most_elements(self.scene)))
+
+    @cached_property
+    def loop(self) -> PointLoop | None:
+        """The loop in C over points of the scene; None where they need Python in between."""
+        return loop_of(self.scene, self.driver, by_lanes=self.execution == "lanes")
+
+    def rows(self, points: PointColumns, start: State | None = None, deadline: float = math.inf) -> Rows:
+        """Run the points of a sweep by one call where they allow it, see `Runner.rows`.
+
+        The loop has the results of `run`, lanes have them to rounding.
+        """
+        if not self.scene.sweep or self.loop is None:
+            return super().rows(points, start, deadline)
+        # what runs many points takes time to load
+        from vibroimpact.orchestrator.run.many_points.rows import rows_of
+
+        ran = rows_of(self.loop, points, start, deadline, self.record_of)
+        return super().rows(points, start, deadline) if ran is None else ran
 
     def close(self) -> None:
         """Free the components."""
@@ -176,54 +202,6 @@ def driver_of(
             wrap=wrap,
         )
     raise SceneError([f'{scene.source}: execution.how: expected "fused" or "coupled", got "{execution}".'])
-
-
-def recorded_window(scene: Scene, parameters: Mapping[str, float]) -> tuple[float, float]:
-    """Return start and end of the recording, s; those of a forced scene are at forcing phase 0.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of the short form.
-    parameters : mapping of str to float
-        Of its body, as `float_parameters` gives them.
-    """
-    if scene.period is None:
-        record = scene.record
-        return record.transient_time, record.transient_time + record.recorded_time
-    phase, angular_frequency = parameters["forcing.phase"], parameters["forcing.angular_frequency"]
-    return forced_window(scene.record, phase, angular_frequency)
-
-
-def forced_window(record: Record, phase: Numbers, angular_frequency: Numbers) -> tuple[Numbers, Numbers]:
-    """Return start and end of the recording of a forced scene, s; of one point, or of many as arrays.
-
-    Parameters
-    ----------
-    record : Record
-        Its `[record]`.
-    phase, angular_frequency : float or ndarray
-        Of the force at time 0, rad, and rad/s.
-    """
-    period, lead = TWO_PI / angular_frequency, phase % TWO_PI
-    lag = lead / angular_frequency
-    first = record.transient_periods + (lead > 0.0)
-    return first * period - lag, (first + record.recorded_periods) * period - lag
-
-
-def limit_message(limit: int, time: float) -> str:
-    """Return what a run that came to its impact limit says, `time` s after its start."""
-    return f"impact_limit: {limit} impacts, touch-downs and rests at time {time:.17g}"
-
-
-def late_message(deadline: float | None, time: float) -> str:
-    """Return what a run that took longer than its deadline says, `time` s after its start."""
-    return f"deadline: {deadline} s passed at time {time:.17g}"
-
-
-def no_load_message(contact: int) -> str:
-    """Return what a run says that ends at rest on a stop (from 1) on which nothing presses the body."""
-    return f"rests on stop[{contact}] without load"
 
 
 class _Run:

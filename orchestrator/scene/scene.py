@@ -182,6 +182,11 @@ class Scene(SceneTable):
         return bool(self.channels) or self.falling_force
 
     @property
+    def is_guarded(self) -> bool:
+        """Whether its points run in a process that an FMU may crash or hang."""
+        return self.general.guard if self.general is not None else self.execution.guard
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Files beside its own that a run of it reads: recordings that drive it, FMUs."""
         folder = Path(self.source).parent

@@ -82,7 +82,7 @@ def effects(scene: Scene) -> dict[str, bool]:
     common = {
         "time series": _samples(scene),
         "continuation": any(axis.continuation for axis in scene.sweep),
-        "guard process": scene.general.guard if scene.general is not None else scene.execution.guard,
+        "guard process": scene.is_guarded,
     }
     if scene.general is not None:
         called = called_by_components(scene.general, scene.sweep)

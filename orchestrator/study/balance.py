@@ -9,7 +9,7 @@ import numpy as np
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.run.parameters import float_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
+from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.study.observation import Floats

@@ -17,7 +17,7 @@ import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.analysis.dataset.results import Rows, described
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.run.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.fields import rule_of

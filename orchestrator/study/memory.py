@@ -47,7 +47,7 @@ def memory_of_ways(
         By place; what a process that died would have taken is missing, and ways for which no time was left. Nothing
         where the system does not tell, or the FMUs run in processes of their own.
     """
-    guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+    guarded = scene.is_guarded
     if guarded or not IS_MEASURED:
         return {}
     try:

@@ -54,7 +54,7 @@ def test_the_build_of_the_fmus_starts_without_a_single_installed_package() -> No
         # half a second for each process that an FMU has taken down
         ("vibroimpact.orchestrator.guard.child", ("xarray", "pandas", "scipy")),
         # a tenth of a second that a run without workers does not need
-        ("vibroimpact.orchestrator.campaign.single_run", ("dask", "distributed")),
+        ("vibroimpact.orchestrator.running.whole", ("dask", "distributed")),
     ],
 )
 def test_what_starts_light_loads_nothing_heavy(module: str, not_loaded: tuple[str, ...]) -> None:
@@ -67,7 +67,7 @@ def test_what_starts_light_loads_nothing_heavy(module: str, not_loaded: tuple[st
     "imported_first",
     [
         "from vibroimpact.analysis import open_dataset",
-        "from vibroimpact.orchestrator.run.dataset import dataset_of_runs",
+        "from vibroimpact.orchestrator.run.dataset import dataset_of",
         "from vibroimpact.analysis import figures",
         "import vibroimpact.analysis.landmarks",
     ],

@@ -30,7 +30,7 @@ from scipy.integrate import solve_ivp
 
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.orchestrator.run.parameters import float_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
+from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 from vibroimpact.orchestrator.scene.models import HertzStop, KelvinVoigtStop, RestitutionStop

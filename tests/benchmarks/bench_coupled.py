@@ -47,18 +47,16 @@ from support.coupled_parts import (
 )
 from support.fmu_factory import bouncing_ball
 
-from vibroimpact.analysis.dataset import Direction
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.orchestrator.campaign.chunks import BranchPoint, run_points
-from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
-from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import EventSpec
+from vibroimpact.orchestrator.run.points import independent_points
+from vibroimpact.orchestrator.run.provenance import git_commit, versions
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.scene.sweep import Point
 
 PERIOD = 2.0 * math.pi
 IMPACT_GOALS = {"3.0+3.0": 2.0, "2.0+2.0": 4.0}
@@ -365,20 +363,20 @@ def chunk_times(end: float, step: float, rounds: int) -> tuple[list[list[float]]
         parse_scene(GUARDED.format(end=end, step=step, guard=guard), "guard.toml")
         for guard in ("false", "true")
     ]
-    runners = [make_runner(scene) for scene in scenes]
+    runners = [open_scene(scene) for scene in scenes]
     # on Linux the number of a process is that of its clock too
     clocks = [~child.pid << 3 | 2 for child in psutil.Process().children(recursive=True)]
 
     def spent() -> float:
         return time.process_time() + sum(map(time.clock_gettime, clocks))
 
-    points = [BranchPoint(Point(k, {}), Direction.independent, first=k == 0) for k in range(POINTS)]
+    points = independent_points({}, POINTS)
     processor: list[list[float]] = [[], []]
     wall: list[list[float]] = [[], []]
     for turn in range(-1, rounds):  # the first is not counted
         for way in (0, 1) if turn % 2 else (1, 0):
             before, began = spent(), time.perf_counter()
-            run_points(scenes[way], runners[way], points, None)
+            runners[way].rows(points)
             seconds = time.perf_counter() - began
             if turn >= 0:
                 processor[way].append((spent() - before) / POINTS)

@@ -15,7 +15,6 @@ else runs there is taken from one of the three at a time.
 from __future__ import annotations
 
 import argparse
-import math
 import multiprocessing
 import statistics
 import tempfile
@@ -28,13 +27,11 @@ from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
     Work,
-    columns_of_points,
     get_ready,
+    points_of,
     run_chunk,
-    run_columns,
 )
 from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
@@ -101,10 +98,9 @@ def _bare_process(
 
 def _points_only(work: Work) -> Task:
     branches, runner = expand(work.scene), named_runner(work.scene, work.runner)
-    loop = loop_of(work.scene, runner)
 
     def run(chunk: Chunk) -> None:
-        run_columns(work.scene, runner, loop, columns_of_points(branches, chunk), chunk.start, math.inf)
+        runner.rows(points_of(branches, chunk), chunk.start)
 
     return run
 

@@ -27,8 +27,8 @@ import vibroimpact.orchestrator.campaign.computation as computation
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work
 from vibroimpact.orchestrator.campaign.cluster import QUIET
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
-from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand
 

@@ -12,11 +12,12 @@ from support.command_line import in_this_process
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.orchestrator.campaign import campaign as campaigns
-from vibroimpact.orchestrator.campaign import run_campaign, run_scene
+from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, run_chunk
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
 from vibroimpact.orchestrator.campaign.parts import compact, list_parts
 from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 # issue 4: two unit masses, k = 1, c = 0.1, a stop on mass 2 at 0.1, the force on mass 1

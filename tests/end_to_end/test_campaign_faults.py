@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from distributed.security import Security
+from support.busy_runner import run_busy
 from support.campaign_process import CampaignProcess, fork_servers_of, run_campaign_process, wait_until
 from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, scene_of
 from support.cluster import free_port, started_cluster
@@ -22,7 +23,6 @@ import vibroimpact.orchestrator.campaign.campaign as engine
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign import run_campaign
-from vibroimpact.orchestrator.campaign.single_run import run_scene
 
 POINTS, MILLISECONDS = 600, 3.0
 """Enough that half a second of work is left when four parts are there, on either path."""
@@ -43,7 +43,7 @@ def uninterrupted(
     scene, dataset = folder / "scene.toml", folder / "run.nc"
     points = POINTS if request.param == "independent" else POINTS // 2
     scene.write_text(frequency_text(points, request.param, MILLISECONDS))
-    run_scene(scene_of(scene.read_text()), dataset, runner="support.busy_runner:BusyRunner")
+    run_busy(scene_of(scene.read_text()), dataset)
     return scene, dataset
 
 

@@ -9,7 +9,7 @@ import pytest
 from support import fmu_factory
 
 from vibroimpact.analysis.dataset import Outcome
-from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
@@ -49,7 +49,7 @@ def test_the_call_that_ends_a_point_is_named(
     fmu = fmu_factory.faulty(tmp_path)
     deadline = 0.4 if outcome is Outcome.timeout else 30.0
     text = SCENE.format(fmu=fmu, fault=fault, place=place, deadline=deadline)
-    runner = make_runner(parse_scene(text, str(tmp_path / "scene.toml")))
+    runner = open_scene(parse_scene(text, str(tmp_path / "scene.toml")))
     try:
         record = runner.run({})
     finally:

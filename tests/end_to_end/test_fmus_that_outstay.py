@@ -15,8 +15,8 @@ from support import fmu_factory
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard import guarded as guard
-from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.run import Runner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
@@ -57,7 +57,7 @@ def runner_of(folder: Path) -> Iterator[Callable[..., Runner]]:
         fault: str, place: str = "step", *, after: int = 0, fmi: str = "3.0", deadline: float = 30.0
     ) -> Runner:
         text = SCENE.format(major=fmi[0], fault=fault, place=place, after=after, deadline=deadline)
-        made.append(make_runner(parse_scene(text, str(folder / "scene.toml"))))
+        made.append(open_scene(parse_scene(text, str(folder / "scene.toml"))))
         return made[-1]
 
     yield runner
@@ -194,9 +194,9 @@ def test_processes_of_a_component_that_then_crashes_end_with_it(
 PARENT = """
 import sys
 from pathlib import Path
-from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
-runner = make_runner(parse_scene(Path(sys.argv[1]).read_text(), sys.argv[1]))
+runner = open_scene(parse_scene(Path(sys.argv[1]).read_text(), sys.argv[1]))
 print("ready", flush=True)
 runner.run({"culprit.u": 1.0})
 print("run", flush=True)
@@ -292,4 +292,4 @@ def test_a_library_that_was_cut_off_is_named_with_its_file(folder: Path, tmp_pat
             cut.writestr(name, content[:8192] if name.endswith(".so") else content)
     text = SCENE.format(major="3", fault="none", place="step", after=0, deadline=5.0)
     with pytest.raises(ComponentError, match=r"Faulty\.fmi3\.fmu"):
-        make_runner(parse_scene(text, str(tmp_path / "scene.toml")))
+        open_scene(parse_scene(text, str(tmp_path / "scene.toml")))

@@ -17,7 +17,8 @@ from support.command_line import vibroimpact
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.guard import GuardedRunner, make_runner
+from vibroimpact.orchestrator.guard import GuardedRunner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
@@ -104,7 +105,7 @@ def runner_of(folder: Path) -> Iterator[Callable[[str, float], GuardedRunner]]:
     def runner(fmi: str, deadline: float) -> GuardedRunner:
         if (fmi, deadline) not in made:
             scene = parse_scene(scene_text(fmi, deadline), str(folder / "faults.toml"))
-            guarded = make_runner(scene)
+            guarded = open_scene(scene)
             assert isinstance(guarded, GuardedRunner)
             made[fmi, deadline] = guarded
         return made[fmi, deadline]
@@ -168,7 +169,7 @@ def test_a_fault_is_an_outcome_or_an_error_that_says_who_where_and_when(
 def test_a_crash_after_log_lines_tells_the_last_ones_and_none_of_another_point(folder: Path) -> None:
     # the flood happens from .1 on in every step; then another point crashes without a word
     scene = parse_scene(scene_text("3.0"), str(folder / "faults.toml"))
-    runner = make_runner(scene)
+    runner = open_scene(scene)
     try:
         flooded = runner.run({"culprit.fault": float(FAULTS.index("log_flood"))})
         assert flooded.outcome is Outcome.ok
@@ -182,7 +183,7 @@ def test_a_crash_after_log_lines_tells_the_last_ones_and_none_of_another_point(f
 
 def test_what_a_component_logged_before_it_hung_is_told(folder: Path) -> None:
     # a deadline that passes inside a flood without end: the lines up to then are there
-    runner = make_runner(parse_scene(scene_text("2.0", 2.0), str(folder / "f.toml")))
+    runner = open_scene(parse_scene(scene_text("2.0", 2.0), str(folder / "f.toml")))
     try:
         record = runner.run({"culprit.fault": float(ENDLESS_LOG)})
     finally:
@@ -194,7 +195,7 @@ def test_what_a_component_logged_before_it_hung_is_told(folder: Path) -> None:
 
 def test_a_hundred_failing_points_do_not_confuse_what_is_told_of_the_next_one(folder: Path) -> None:
     # every failing point makes the components anew: the notes must not run out of room
-    runner = make_runner(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
+    runner = open_scene(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
     try:
         for _ in range(100):
             with pytest.raises(ComponentError, match="culprit: fmi3DoStep returned error"):
@@ -228,7 +229,7 @@ def test_neighbours_of_faults_in_a_batch_are_kept_and_each_fault_is_told_as_if_i
 
 
 def test_a_child_that_is_killed_between_two_points_costs_no_point(folder: Path) -> None:
-    runner = make_runner(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
+    runner = open_scene(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
     try:
         assert_runs_well(runner.run({"culprit.fault": 0.0}))
         tree = [p for child in living_children() for p in (child, *child.children(recursive=True))]
@@ -246,7 +247,7 @@ def test_a_child_that_is_killed_between_two_points_costs_no_point(folder: Path) 
 
 
 def test_ctrl_c_does_not_reach_the_point_that_a_child_runs(folder: Path) -> None:
-    runner = make_runner(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
+    runner = open_scene(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
     try:
         before = living_children()
         for child in before:
@@ -264,7 +265,7 @@ def test_an_fmu_that_cannot_be_loaded_is_an_error_of_the_runner(folder: Path, tm
     scene = parse_scene(scene_text("3.0"), str(tmp_path / "faults.toml"))
     broken.write_bytes(b"no longer an FMU")
     with pytest.raises(ComponentError, match=r"Faulty\.fmi3\.fmu"):
-        make_runner(scene)
+        open_scene(scene)
     assert set(living_children()) <= set(before)
 
 
@@ -272,9 +273,9 @@ def test_an_fmu_that_cannot_be_loaded_is_an_error_of_the_runner(folder: Path, tm
 
 PARENT = """
 import sys
-from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import load_scene
-runner = make_runner(load_scene(sys.argv[1]))
+runner = open_scene(load_scene(sys.argv[1]))
 print("ready", flush=True)
 runner.run({"culprit.fault": 4.0})
 """
@@ -411,7 +412,7 @@ def test_a_law_in_python_that_never_answers_is_told_as_the_call_that_hangs(tmp_p
     before = living_children()
     (tmp_path / "law.py").write_text(HANGING_LAW, encoding="utf-8")
     build_user_contact_law(tmp_path / "law.py", tmp_path / "law.fmu")
-    runner = make_runner(parse_scene(LAW_SCENE, str(tmp_path / "law.toml")))
+    runner = open_scene(parse_scene(LAW_SCENE, str(tmp_path / "law.toml")))
     try:
         record = runner.run({})
     finally:

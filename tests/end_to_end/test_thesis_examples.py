@@ -19,7 +19,7 @@ from support.reference_bodies import beam_shape, period_one_orbits, uniform_chai
 
 from vibroimpact import find_orbits
 from vibroimpact.analysis import figures, open_dataset
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import load_scene
 
 FOLDER = EXAMPLES / "thesis"

@@ -20,9 +20,9 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES, exported_floats, integer_parameters
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import dataset_name
 

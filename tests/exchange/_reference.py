@@ -16,7 +16,7 @@ from support.places import EXAMPLES
 from exchange._cases import Rows
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 
 VARIABLE = "VIBROIMPACT_REFERENCE_FMUS"

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
-from vibroimpact.orchestrator.campaign import run_campaign, run_scene
+from vibroimpact.orchestrator.campaign import run_campaign
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 # Two masses that know nothing of each other: the first is in a long contact when the second meets its stop.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -16,15 +15,9 @@ from numpy.typing import NDArray
 from support.drawn_oscillators import LAWS, OSCILLATOR, oscillators
 
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    columns_of_points,
-    dataset_of,
-    run_columns,
-)
-from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
+from vibroimpact.orchestrator.run.dataset import dataset_of
+from vibroimpact.orchestrator.run.points import columns_of_points
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
@@ -37,17 +30,14 @@ AGREEMENT = 1e-9
 
 def rows_of(scene: Scene, cuts: Sequence[int] = ()) -> xr.Dataset:
     """Return the rows of a scene, its points cut where it is said, as the chunks of a campaign are."""
-    runner = named_runner(scene, DEFAULT_RUNNER)
-    loop = loop_of(scene, runner)
     edges = [0, *cuts, run_count(scene.sweep)]
-    points = columns_of_points(expand(scene), Chunk(0, 0, edges[-1]))
+    points = columns_of_points(expand(scene), 0, edges[-1])
     pieces: list[RunColumns] = []
     carried = None
-    for first, stop in pairwise(edges):
-        own = points.chosen(slice(first, stop))
-        ran, carried = run_columns(scene, runner, loop, own, carried, math.inf)
-        pieces.append(ran if isinstance(ran, RunColumns) else columns_of(ran))
-    runner.close()
+    with open_scene(scene) as runner:
+        for first, stop in pairwise(edges):
+            ran, carried = runner.rows(points.chosen(slice(first, stop)), carried)
+            pieces.append(ran if isinstance(ran, RunColumns) else columns_of(ran))
     return dataset_of(scene, points, joined(pieces), {})
 
 
@@ -95,7 +85,8 @@ def with_execution(text: str, how: str) -> Scene:
 def test_points_in_lanes_are_those_of_the_scalar_engine_however_they_are_cut(text: str, data: Any) -> None:
     across = text + '"stop[1].restitution" = { values = [0.0, 0.5, 1.0] }\n'
     scene = with_execution(across, "auto")
-    assert named_runner(scene, DEFAULT_RUNNER).execution == "lanes"
+    with open_scene(scene) as runner:
+        assert runner.execution == "lanes"
     whole = rows_of(scene)
     assert_agree(whole, rows_of(with_execution(across, "fused")))
     cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import xarray as xr
 from hypothesis import given, settings
 from support.drawn_oscillators import FORCED, LAWS, MOST_IMPACTS, OSCILLATOR, oscillators
 
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    columns_of_points,
-    dataset_of,
-    points_of,
-    run_in_loop,
-    run_points,
-)
-from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
+from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.run.dataset import dataset_of
+from vibroimpact.orchestrator.run.many_points.rows import rows_of
+from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
@@ -26,17 +21,14 @@ FUSED = '[execution]\nhow = "fused"\n'
 
 def in_both_ways(scene: Scene) -> tuple[xr.Dataset, xr.Dataset]:
     """Return the rows of a scene by the loop in C, and by points that are run one by one."""
-    branches, chunk = expand(scene), Chunk(0, 0, run_count(scene.sweep))
-    runner = named_runner(scene, DEFAULT_RUNNER)
-    loop, points = loop_of(scene, runner), columns_of_points(branches, chunk)
-    assert loop is not None
-    ran = run_in_loop(scene, runner, loop, points, None)
-    assert ran is not None
-    places = points_of(branches, chunk)
-    alone, carried = run_points(scene, runner, places, None)
-    runner.close()
+    points = columns_of_points(expand(scene), 0, run_count(scene.sweep))
+    with PointRunner(scene, execution=scene.execution.how) as runner:
+        assert runner.loop is not None
+        ran = rows_of(runner.loop, points, None, math.inf, runner.record_of)
+        assert ran is not None
+        alone, carried = runner.rows_one_by_one(points.places(), None, math.inf)
     assert ran[1] == carried
-    return dataset_of(scene, points, ran[0], {}), dataset_of(scene, places, alone, {})
+    return dataset_of(scene, points, ran[0], {}), dataset_of(scene, points, alone, {})
 
 
 def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
@@ -96,4 +88,5 @@ def test_scenes_that_need_python_between_points_have_no_loop() -> None:
         sweep='"body.mass" = { values = [1.0, 2.0] }', forcing="",
     )  # fmt: skip
     scene = parse_scene(text, "sampled.toml")
-    assert loop_of(scene, named_runner(scene, DEFAULT_RUNNER)) is None
+    with PointRunner(scene) as runner:
+        assert runner.loop is None

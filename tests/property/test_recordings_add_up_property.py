@@ -6,8 +6,6 @@ body, lanes, and pairs of bodies.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -16,15 +14,9 @@ from numpy.typing import NDArray
 from support.cut_recordings import counts_differ, problem_of_cuts
 
 from vibroimpact.analysis.dataset.columns import RunColumns
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    columns_of_points,
-    run_columns,
-)
-from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.general import GeneralRunner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
+from vibroimpact.orchestrator.run.points import columns_of_points
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
@@ -158,11 +150,9 @@ def test_recordings_of_points_in_lanes_and_in_the_loop_add_up(
     def impacts(begin: float, end: float) -> list[int]:
         text = LANES.format(displacement=displacement, begin=begin, length=end - begin, how=how)
         scene = parse_scene(text, "lanes.toml")
-        runner = named_runner(scene, DEFAULT_RUNNER)
-        assert runner.execution == ("lanes" if how == "auto" else "fused")
-        points = columns_of_points(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
-        ran, _ = run_columns(scene, runner, loop_of(scene, runner), points, None, math.inf)
-        runner.close()
+        with open_scene(scene) as runner:
+            assert runner.execution == ("lanes" if how == "auto" else "fused")
+            ran, _ = runner.rows(columns_of_points(expand(scene), 0, run_count(scene.sweep)))
         assert isinstance(ran, RunColumns)
         assert ran.impacts is not None
         return [int(count) for count in ran.impacts.count]

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.analysis.dataset import check, read_flat
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 FEW = settings(max_examples=25, derandomize=True, suppress_health_check=list(HealthCheck))

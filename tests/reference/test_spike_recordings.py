@@ -17,7 +17,7 @@ from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, EventTrain, open_signals
 from vibroimpact.analysis.spikes import Mechanics, SpikeSettings, identify, measure_pulses, spike_report
 from vibroimpact.hardware.recordings import ImportSettings, import_recording
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 

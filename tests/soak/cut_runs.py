@@ -7,7 +7,6 @@ bodies of other tools. Contacts are open, the body rests or chatters where a run
 from __future__ import annotations
 
 import json
-import math
 import random
 from itertools import pairwise
 from pathlib import Path
@@ -20,11 +19,10 @@ from support.cut_recordings import FAINT, MOST_EVENTS, counts_differ, problem_of
 
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, columns_of_points, run_columns
-from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.general import GeneralRunner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
 from vibroimpact.orchestrator.run.point import driver_of
+from vibroimpact.orchestrator.run.points import columns_of_points
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
@@ -235,12 +233,8 @@ def _counts(tables: Tables, is_forced: bool, begin: float, end: float) -> list[i
     unit = "periods" if is_forced else "time"
     window = {f"transient_{unit}": begin, f"recorded_{unit}": end - begin}
     scene = Scene.from_dict(tables | {"record": window})
-    runner = named_runner(scene, DEFAULT_RUNNER)
-    try:
-        points = columns_of_points(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
-        ran, _ = run_columns(scene, runner, loop_of(scene, runner), points, None, math.inf)
-    finally:
-        runner.close()
+    with open_scene(scene) as runner:
+        ran, _ = runner.rows(columns_of_points(expand(scene), 0, run_count(scene.sweep)))
     columns = ran if isinstance(ran, RunColumns) else columns_of(ran)
     assert columns.impacts is not None
     assert columns.sticks is not None

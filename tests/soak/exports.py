@@ -14,9 +14,9 @@ from fmpy import simulate_fmu
 from vibroimpact.analysis.dataset import Outcome, open_dataset
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 
 CASES, SAMPLE = 1000, 2

@@ -16,8 +16,8 @@ from support import fmu_factory
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard import guarded as guard
-from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.run import Runner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 CASES = 5000
@@ -91,7 +91,7 @@ def _environment(values: dict[str, str], fault: int) -> Iterator[None]:
 def _loaded(text: str) -> str | None:
     """Faults while loading: an error that names the file of a component, or a run that goes well."""
     try:
-        runner = make_runner(parse_scene(text, str(Path.cwd() / "scene.toml")))
+        runner = open_scene(parse_scene(text, str(Path.cwd() / "scene.toml")))
     except ComponentError as error:
         named = str(error).startswith(("culprit: ", "bystander: ")) and ".fmu" in str(error)
         return None if named else f"loading: not named: {error}"
@@ -105,7 +105,7 @@ def _loaded(text: str) -> str | None:
 
 
 def _tried(text: str, faults: list[int]) -> str | None:
-    runner = make_runner(parse_scene(text, str(Path.cwd() / "scene.toml")))
+    runner = open_scene(parse_scene(text, str(Path.cwd() / "scene.toml")))
     try:
         for place, fault in enumerate(faults):
             problem = _point(runner, fault, 1.0 + place)

@@ -14,9 +14,9 @@ from support.places import EXAMPLES
 
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.printable import printable
-from vibroimpact.orchestrator.campaign.chunks import Chunk, points_of, run_point
-from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.run.result_size import bytes_of_a_run
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
@@ -141,15 +141,11 @@ def run_shortly(scene: Scene) -> str | None:
         limited = parse_scene(text, scene.source)
     except SceneError:  # written in a way that takes no further table
         return None
-    runner = named_runner(limited, "vibroimpact.orchestrator.guard.guarded:make_runner")
-    try:
-        (place,) = points_of(
-            expand(limited) if run_count(limited.sweep) < 10_000 else (), Chunk(0, 0, 1)
-        ) or (None,)
-        record = None if place is None else run_point(limited, runner, place.point, None)
-    finally:
-        runner.close()
-    return None if record is None or not record.message else wrong_message(record.message)
+    with open_scene(limited) as runner:
+        if run_count(limited.sweep) >= 10_000:
+            return None
+        record = runner.record_of(columns_of_points(expand(limited), 0, 1).place(0).point.values)
+    return wrong_message(record.message) if record.message else None
 
 
 def check(seed: int) -> str | None:

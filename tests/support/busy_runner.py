@@ -17,17 +17,20 @@ from pathlib import Path
 
 import numpy as np
 
-from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.analysis.dataset import Outcome, RunRecord, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.guard.guarded import make_runner
 from vibroimpact.orchestrator.run.many_points import lanes_rows
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop
 from vibroimpact.orchestrator.run.point import PointRunner
+from vibroimpact.orchestrator.run.points import State
+from vibroimpact.orchestrator.run.runner import Runner
+from vibroimpact.orchestrator.running import open_scene
+from vibroimpact.orchestrator.running.whole import run_whole
 from vibroimpact.orchestrator.scene import Scene
 
 
-class BusyRunner:
+class BusyRunner(Runner):
     """Takes `body.mass` milliseconds for a point and returns a record of three impacts."""
 
     execution = "busy"
@@ -38,7 +41,7 @@ class BusyRunner:
         self.scene = scene
         self.periods = scene.record.recorded_periods or 1
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point: a contraction towards a point that the swept values decide."""
         began = time.perf_counter()
         scene = self.scene.at(values)
@@ -70,6 +73,11 @@ class BusyRunner:
         """Hold nothing."""
 
 
+def run_busy(scene: Scene, path: Path) -> None:
+    """Write the dataset of all points of a scene, run in this process."""
+    write_dataset(run_whole(BusyRunner(scene)), path)
+
+
 class SceneRunner(BusyRunner):
     """Knows its scene only, as a real runner: which of its numbers are swept makes no difference."""
 
@@ -87,16 +95,16 @@ class OtherBuildRunner(SceneRunner):
         self.fmu_hashes = {"Busy": "1" * 64}
 
 
-class UnhurriedRunner:
+class UnhurriedRunner(Runner):
     """The real runner of a scene, asleep for a while at each point: time to kill what runs it."""
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
-        self._runner = make_runner(scene, execution=execution)
+        self._runner, self.scene = open_scene(scene, execution=execution), scene
         self.execution = self._runner.execution
         self.instruction_set = self._runner.instruction_set
         self.fmu_hashes = self._runner.fmu_hashes
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point, after 5 ms."""
         time.sleep(0.005)
         return self._runner.run(values, start)
@@ -111,7 +119,7 @@ def unhurried_lanes(scene: Scene, *, execution: str = "auto") -> PointRunner:
 
     Chunks are short then and often cut: the time of one is over when its first points begin.
     """
-    runner = make_runner(scene, execution=execution)
+    runner = open_scene(scene, execution=execution)
     assert isinstance(runner, PointRunner)
     assert runner.execution == "lanes"
     at_once = lanes_rows.run_in_lanes
@@ -129,7 +137,7 @@ def unhurried_lanes(scene: Scene, *, execution: str = "auto") -> PointRunner:
 class BrittleRunner(BusyRunner):
     """Fails, with a message, at every point whose forcing amplitude is negative."""
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point, or raise."""
         if self.scene.at(values).value("forcing.amplitude") < 0:
             raise ComponentError("oscillator: the step failed; expected a step that ends, got none.")
@@ -139,7 +147,7 @@ class BrittleRunner(BusyRunner):
 class DeadlyRunner(BusyRunner):
     """Kills its own process at every point whose forcing amplitude is negative."""
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point, or die."""
         if self.scene.at(values).value("forcing.amplitude") < 0:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -149,7 +157,7 @@ class DeadlyRunner(BusyRunner):
 class HuntedRunner(BusyRunner):
     """Is taken away at every point whose forcing amplitude is negative, as long as it runs in a worker."""
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point, or die."""
         if self.scene.at(values).value("forcing.amplitude") < 0 and _is_worker():
             os.kill(os.getpid(), signal.SIGKILL)
@@ -182,7 +190,7 @@ class UnlikeRunner(BusyRunner):
 class OnceDeadlyRunner(BusyRunner):
     """Kills its process once, at the first point after the file named by VIBROIMPACT_TEST_KILL appeared."""
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point, or die if the file is there and this process is the one to take it away."""
         wish = Path(os.environ["VIBROIMPACT_TEST_KILL"])
         try:

@@ -55,7 +55,7 @@ def measure_sweep(
     from vibroimpact.analysis.dataset import open_dataset
     from vibroimpact.hardware.programs.sweep.program import measure
     from vibroimpact.hardware.programs.sweep.settings import read_sweep
-    from vibroimpact.orchestrator.campaign.progress import shown_progress
+    from vibroimpact.orchestrator.run.progress import shown_progress
 
     settings = read_sweep(Path(file))
     with shown_progress() if progress else nullcontext() as shown:

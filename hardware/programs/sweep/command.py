@@ -16,7 +16,7 @@ from vibroimpact.hardware.programs.sweep.drawing import draw_plan
 from vibroimpact.hardware.programs.sweep.plan import planned
 from vibroimpact.hardware.programs.sweep.program import measure
 from vibroimpact.hardware.programs.sweep.settings import SweepSettings, read_sweep
-from vibroimpact.orchestrator.campaign.progress import clock, shown_progress
+from vibroimpact.orchestrator.run.progress import clock, shown_progress
 
 PLAN = "plan.png"
 

@@ -36,7 +36,7 @@ from vibroimpact.hardware.rig.limits import Limits
 from vibroimpact.hardware.rig.opening import opened_rig
 from vibroimpact.hardware.rig.output import Output, start_trigger
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
-from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.run.progress import Progress
 
 _SURE_SECONDS = 1.0
 """Time, besides that of a fall from the highest voltage, after which a step is sure, s."""

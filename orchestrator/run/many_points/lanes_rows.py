@@ -23,17 +23,17 @@ from vibroimpact.orchestrator.run.many_points.loop_rows import (
     run_loop,
 )
 from vibroimpact.orchestrator.run.parameters import oscillator_start
-from vibroimpact.orchestrator.run.point import limit_message
+from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH, impact_rows
+from vibroimpact.orchestrator.run.runner import CARRYING, next_start
+from vibroimpact.orchestrator.run.window import limit_message
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 
 ROWS_ROOM = 65_536
 """Rows of impacts and periods that the lanes write before Python takes them."""
-CARRYING = (Outcome.ok, Outcome.stuck)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-State = tuple[float, ...]
 Alone = Callable[[int, State | None], RunRecord]
 """Runs one point, by its place, from the state it is given."""
 
@@ -106,7 +106,7 @@ def run_in_lanes(
     if len(points) == 1:
         given = points.starts.get(0)
         record = alone(0, given)
-        return columns_of([record]), _next_start(record, given) if loop.chained else None
+        return columns_of([record]), next_start(record, given) if loop.chained else None
     return _run_halves(loop, points, deadline, alone)
 
 
@@ -129,14 +129,6 @@ def _run_halves(
     rest = points.piece(half, len(points), carried)
     more, carried = run_in_lanes(loop, rest, deadline, lambda place, given: alone(half + place, given))
     return joined([columns, more]), carried
-
-
-def _next_start(record: RunRecord, given: State | None) -> State | None:
-    if record.outcome not in CARRYING:
-        return given
-    if record.final_state is not None:
-        return tuple(record.final_state.tolist())
-    return (record.final_displacement, record.final_velocity)
 
 
 class _LaneRun:

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.core import runs as core
 from vibroimpact.orchestrator.run.fused import BodyDriver
-from vibroimpact.orchestrator.run.opening import Runner
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
-from vibroimpact.orchestrator.run.point import PointRunner, forced_window
-from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY, TOUCH_DOWN
+from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY, TOUCH_DOWN, RecordedBody
+from vibroimpact.orchestrator.run.window import forced_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 from vibroimpact.orchestrator.scene.keys import MODES
@@ -73,12 +72,8 @@ class PreparedPoints:
     periods: bool
 
 
-def loop_of(scene: Scene, runner: Runner) -> PointLoop | None:
+def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop | None:
     """Return the loop in C over points of a scene; None where they need Python in between."""
-    if not isinstance(runner, PointRunner) or runner.execution not in ("fused", "lanes"):
-        return None
-    by_lanes = runner.execution == "lanes"
-    driver = runner.driver
     deadline, chained = scene.execution.deadline, any(axis.continuation for axis in scene.sweep)
     if (
         not isinstance(driver, BodyDriver)

@@ -15,7 +15,7 @@ from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of,
 from vibroimpact.fmus.core import runs as core
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PreparedPoints
 from vibroimpact.orchestrator.run.parameters import state_variables
-from vibroimpact.orchestrator.run.point import TWO_PI, late_message, limit_message, no_load_message
+from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.record import (
     OBSERVED,
     ROW_CAPACITY,
@@ -28,6 +28,7 @@ from vibroimpact.orchestrator.run.record import (
     in_time_order,
     open_contacts,
 )
+from vibroimpact.orchestrator.run.window import TWO_PI, late_message, limit_message, no_load_message
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
 LISTEN_SECONDS = 0.05
@@ -38,7 +39,6 @@ ROWS_ROOM = 64 * ROW_CAPACITY
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-State = tuple[float, ...]
 Alone = Callable[[int, State | None], tuple[RunRecord, State | None]]
 """Runs one point, by its place, from the state it is given; returns its record and the state that it hands on."""
 

@@ -141,7 +141,7 @@ def observed_within(scene: Scene, seconds: float) -> Observation:
 
 def limited_elsewhere(scene: Scene, seconds: float) -> Scene:
     """Return a scene whose runs in another process, where it asks for one, are given up after some wall time, s."""
-    is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+    is_guarded = scene.is_guarded
     if not is_guarded:
         return scene
     own, most = scene.execution.deadline, max(LEAST_GUARDED, seconds)

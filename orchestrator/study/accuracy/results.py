@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import Rows, described
-from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.run.provenance import git_commit, versions
 from vibroimpact.orchestrator.study.accuracy.choice import advice, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES

@@ -9,7 +9,7 @@ from typing import Any
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.run.parameters import float_parameters
-from vibroimpact.orchestrator.run.point import recorded_window
+from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene

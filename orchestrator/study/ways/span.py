@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from vibroimpact.orchestrator.run.point import recorded_window
+from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.ways.replays import first_part_of_replay
 

@@ -81,7 +81,7 @@ class SceneTrial:
 
     def __init__(self, scene: Scene, wrap: Wrapper | None = None) -> None:
         of = None if wrap is None else (lambda name: wrap)
-        self.is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+        self.is_guarded = scene.is_guarded
         self._runner = open_runner(scene, scene.execution.how, wrap=of)
 
     def run(self) -> Observation:

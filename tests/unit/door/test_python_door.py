@@ -21,7 +21,7 @@ from support.still_clock import StillClock, let_nothing_run, stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_dataset
-from vibroimpact.orchestrator.campaign.progress import NotebookBar
+from vibroimpact.orchestrator.run.progress import NotebookBar
 from vibroimpact.orchestrator.study.clock import Clock
 
 DOOR = ROOT / "door" / "__init__.py"

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 import vibroimpact as vi
 from vibroimpact.analysis.figures import largest_impact_velocity
 from vibroimpact.analysis.orbits.classify import classify
-from vibroimpact.orchestrator.campaign import run_campaign, run_scene
+from vibroimpact.orchestrator.campaign import run_campaign
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.service.landed import READING, LandedReader, files_of
 from vibroimpact.service.page_api import examples_folder
 from vibroimpact.service.point_process import simulated

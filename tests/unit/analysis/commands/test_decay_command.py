@@ -10,8 +10,8 @@ import xarray as xr
 from support.decay_motion import Damped
 
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.commands.cli import main
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 TIME = np.arange(0.0, 25.0, 0.05)

@@ -19,7 +19,7 @@ from vibroimpact.analysis.decay.resonance import (
 from vibroimpact.analysis.decay.swept_response import swept_response
 from vibroimpact.analysis.recording import Channel, TimeAxis
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 NATURAL, RATIO, MASS = 20.0, 0.03, 2.0

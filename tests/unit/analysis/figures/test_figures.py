@@ -21,7 +21,7 @@ from vibroimpact.analysis.figures.scene_text import limits
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.running import run_scene
 
 PNG = b"\x89PNG\r\n"
 

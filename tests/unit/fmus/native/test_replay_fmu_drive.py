@@ -17,10 +17,10 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.packaging.replay_fmu import build_replay
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.importer.component import kind_of
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import load_scene
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from support.busy_runner import BusyRunner
 from support.campaign_scenes import frequency_text, plane_text, scene_of
 from support.command_line import in_this_process
 
 import vibroimpact.orchestrator.campaign.check as scene_check
 import vibroimpact.orchestrator.scene.sweep as sweep
-from vibroimpact.analysis.dataset import Outcome, read_flat
-from vibroimpact.orchestrator.campaign import cost_of, run_scene
+from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
+from vibroimpact.orchestrator.campaign import cost_of
 from vibroimpact.orchestrator.campaign.check import BYTES_BESIDE
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.summary import effects, engine, in_one_line, laws
 
@@ -239,14 +241,14 @@ def test_ctrl_c_during_the_trial_frees_what_was_loaded(
 ) -> None:
     freed = []
 
-    class Hanging:
-        def run(self, *_: object) -> None:
+    class Hanging(BusyRunner):
+        def run(self, *_: object) -> RunRecord:
             raise KeyboardInterrupt
 
         def close(self) -> None:
             freed.append(self)
 
-    monkeypatch.setattr(scene_check, "named_runner", lambda *_: Hanging())
+    monkeypatch.setattr(scene_check, "open_scene", Hanging)
     scene_file.write_text(frequency_text(3))
     assert in_this_process("check", scene_file).returncode == 130
     assert freed

@@ -3,19 +3,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.busy_runner import BrittleRunner, BusyRunner
+from support.busy_runner import BrittleRunner, BusyRunner, run_busy
 from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, plane_text, scene_of
 
 from vibroimpact.analysis.dataset import Outcome, read_flat, write_dataset
 from vibroimpact.fmus.errors import CampaignError
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
     Work,
     get_ready,
     points_of,
     run_chunk,
-    run_points,
     write_crashed,
 )
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
@@ -61,16 +59,17 @@ def test_rows_do_not_depend_on_how_runs_are_cut_into_chunks(tmp_path: Path, path
     compact(coarse, tmp_path / "coarse.nc", scene_of(text), {})
     assert_same_rows(tmp_path / "fine.nc", tmp_path / "coarse.nc")
     assert read_flat(tmp_path / "fine.nc").attrs == read_flat(tmp_path / "coarse.nc").attrs
-    run_scene(scene_of(text), tmp_path / "run.nc", runner=BUSY)
+    run_busy(scene_of(text), tmp_path / "run.nc")
     assert_same_rows(tmp_path / "run.nc", tmp_path / "coarse.nc")
 
 
 def test_a_branch_goes_on_from_the_state_of_the_run_before(tmp_path: Path) -> None:
     scene = scene_of(frequency_text(3, "up", milliseconds=0.01))
     points = points_of(expand(scene), Chunk(0, 0, 3))
-    records, carried = run_points(scene, BusyRunner(scene), points, None)
+    records, carried = BusyRunner(scene).rows(points)
+    assert isinstance(records, list)
     before = (records[0].final_displacement, records[0].final_velocity)
-    alone = BusyRunner(scene).run(points[1].point.values, before)
+    alone = BusyRunner(scene).run(points.place(1).point.values, before)
     assert alone.final_displacement == records[1].final_displacement
     assert carried == (records[2].final_displacement, records[2].final_velocity)
 
@@ -78,8 +77,9 @@ def test_a_branch_goes_on_from_the_state_of_the_run_before(tmp_path: Path) -> No
 def test_a_failed_run_hands_on_the_state_it_was_given() -> None:
     text = frequency_text(2, "up", milliseconds=0.01).replace("amplitude = 0.5", "amplitude = -0.5")
     scene = scene_of(text)
-    second = points_of(expand(scene), Chunk(0, 0, 2))[1:]
-    records, carried = run_points(scene, BrittleRunner(scene), second, (0.25, 1.5))
+    second = points_of(expand(scene), Chunk(0, 1, 2))
+    records, carried = BrittleRunner(scene).rows(second, (0.25, 1.5))
+    assert isinstance(records, list)
     assert [record.outcome for record in records] == [Outcome.error]
     assert "the step failed" in records[0].message
     assert math.isnan(records[0].final_displacement)
@@ -197,7 +197,7 @@ def test_parts_that_do_not_fit_are_named_with_the_reason(tmp_path: Path) -> None
 
 def test_the_dataset_of_a_campaign_says_where_it_comes_from(tmp_path: Path) -> None:
     text = frequency_text(3, milliseconds=0.01, title="where from")
-    run_scene(scene_of(text), tmp_path / "run.nc", runner=BUSY)
+    run_busy(scene_of(text), tmp_path / "run.nc")
     attrs = read_flat(tmp_path / "run.nc").attrs
     assert attrs["scene"] == text
     assert attrs["title"] == "where from"

@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.campaign import cluster
 from vibroimpact.orchestrator.campaign import pool as pool_module
 from vibroimpact.orchestrator.campaign.cluster import MOST_STARTS, open_workers
 from vibroimpact.orchestrator.campaign.pool import MOST_DEATHS
-from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.run.progress import Progress
 
 kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 

@@ -14,8 +14,9 @@ from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.analysis.jumps import jumps_of
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_scene
+from vibroimpact.orchestrator.campaign import CampaignInterrupted
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 BODY = """

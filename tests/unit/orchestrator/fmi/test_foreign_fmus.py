@@ -13,8 +13,8 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi import rounding
-from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.run.general import GeneralRunner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 EXAMPLE = EXAMPLES / "bouncing_ball.toml"
@@ -235,7 +235,7 @@ def test_a_component_that_ends_a_repeated_step_early_is_an_error_and_no_wrong_sa
     text = text.replace("says_early = 0", "fault_after = 1").replace(
         "macro_step = 0.1", "macro_step = 0.1\nguard = true"
     )
-    runner = make_runner(parse_scene(text, str(folder / "scene.toml")))
+    runner = open_scene(parse_scene(text, str(folder / "scene.toml")))
     try:
         with pytest.raises(
             ComponentError, match=r"culprit: fmi3DoStep: expected .* at time 0\.3 .*as before"
@@ -336,7 +336,7 @@ guard = {guard}
 @pytest.mark.parametrize("major", ["2", "3"])
 def test_a_component_gets_the_texts_of_its_scene(folder: Path, major: str, label: str, guard: str) -> None:
     scene = parse_scene(LABELLED.format(major=major, label=label, guard=guard), str(folder / "scene.toml"))
-    runner = make_runner(scene)
+    runner = open_scene(scene)
     try:
         for _ in range(2):  # the second time after a reset
             found = runner.run({})
@@ -378,7 +378,7 @@ def test_a_component_is_set_up_with_the_tolerance_of_its_table(
     folder: Path, major: str, line: str, given: float, guard: str
 ) -> None:
     text = TOLERANT.format(major=major, tolerance=line, guard=guard)
-    runner = make_runner(parse_scene(text, str(folder / "scene.toml")))
+    runner = open_scene(parse_scene(text, str(folder / "scene.toml")))
     try:
         for _ in range(2):  # the second time after a reset
             found = runner.run({})

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vibroimpact.analysis.dataset import Direction, RunRecord
-from vibroimpact.orchestrator.campaign.chunks import BranchPoint, run_points
-from vibroimpact.orchestrator.guard import GuardedRunner, guarded, make_runner
+from vibroimpact.analysis.dataset import RunRecord
+from vibroimpact.orchestrator.guard import GuardedRunner, guarded
 from vibroimpact.orchestrator.guard.pipe import PointTask
 from vibroimpact.orchestrator.guard.point_process import PointProcess
 from vibroimpact.orchestrator.run import open_runner
+from vibroimpact.orchestrator.run.points import independent_points
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.scene.sweep import Point
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there points are run one by one")
 
@@ -45,7 +45,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 @pytest.fixture(scope="module")
 def runner(scene: Scene) -> Iterator[GuardedRunner]:
-    made = make_runner(scene)
+    made = open_scene(scene)
     assert isinstance(made, GuardedRunner)
     yield made
     made.close()
@@ -80,7 +80,6 @@ def assert_same(record: RunRecord, expected: RunRecord) -> None:
 
 
 def test_the_points_of_a_chunk_are_those_of_a_runner_without_a_guard(
-    scene: Scene,
     runner: GuardedRunner,
     alone: Callable[[float], RunRecord],
     batches: list[int],
@@ -89,11 +88,9 @@ def test_the_points_of_a_chunk_are_those_of_a_runner_without_a_guard(
     # it is given more than it has the time for, and is given the rest again
     monkeypatch.setattr(guarded, "BATCH_TIME", 10.0)
     stiffnesses = [1.0 + k for k in range(40)]
-    points = [
-        BranchPoint(Point(k, {SWEPT: stiffness}), Direction.independent, first=k == 0)
-        for k, stiffness in enumerate(stiffnesses)
-    ]
-    records, _ = run_points(scene, runner, points, None)
+    points = independent_points({SWEPT: np.array(stiffnesses)}, len(stiffnesses))
+    records, _ = runner.rows(points)
+    assert isinstance(records, list)
     for stiffness, record in zip(stiffnesses, records, strict=True):
         assert_same(record, alone(stiffness))
     assert 1 < len(batches) < len(points)

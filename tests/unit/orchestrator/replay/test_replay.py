@@ -15,7 +15,6 @@ from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.recording import Quality, open_signals
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import DatasetError, EstimationError, SceneError, UsageError
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.replay import (
     Replayer,
@@ -29,6 +28,7 @@ from vibroimpact.orchestrator.replay.covariance import covariance_of, drawn_nois
 from vibroimpact.orchestrator.replay.drive import drive_of, quiet_level, step_instants
 from vibroimpact.orchestrator.replay.fit import fit_keys
 from vibroimpact.orchestrator.replay.output import Replayed, replay_dataset
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 TIME = 2e-5 * np.arange(1500)

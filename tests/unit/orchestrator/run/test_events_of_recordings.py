@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, columns_of_points, run_columns
-from vibroimpact.orchestrator.run import PointRunner, named_runner
+from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.general import GeneralRunner
-from vibroimpact.orchestrator.run.many_points.loop import loop_of
+from vibroimpact.orchestrator.run.points import columns_of_points
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 from vibroimpact.orchestrator.study.observation import observation_of
@@ -72,11 +72,9 @@ def test_a_contact_that_is_open_at_the_end_is_an_impact_of_its_period(how: str) 
 def test_the_loop_over_points_has_the_open_contacts_of_single_runs() -> None:
     text = OPEN_HERTZ + '[sweep]\n"stop[1].position" = { values = [0.3, 0.28, 0.25, 0.2] }\n'
     scene = parse_scene(text, "scene.toml")
-    runner = named_runner(scene, DEFAULT_RUNNER)
-    points = columns_of_points(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
-    ran, _ = run_columns(scene, runner, loop_of(scene, runner), points, None, math.inf)
-    alone = [runner.run({"stop[1].position": value}).impacts for value in (0.3, 0.28, 0.25, 0.2)]
-    runner.close()
+    with open_scene(scene) as runner:
+        ran, _ = runner.rows(columns_of_points(expand(scene), 0, run_count(scene.sweep)))
+        alone = [runner.run({"stop[1].position": value}).impacts for value in (0.3, 0.28, 0.25, 0.2)]
     found = getattr(ran, "impacts", None)
     assert found is not None
     np.testing.assert_array_equal(found.rows, np.concatenate([rows for rows in alone if rows is not None]))

@@ -16,8 +16,8 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
-from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.run.export import export_scene
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.scene.keys import dataset_name
 

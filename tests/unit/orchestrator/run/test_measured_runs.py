@@ -14,9 +14,10 @@ from support.tolerance import PARTITION
 from vibroimpact.analysis.dataset import Outcome, RunRecord, open_dataset
 from vibroimpact.analysis.recording import Quality, open_signals
 from vibroimpact.analysis.spikes import Mechanics, spike_report
-from vibroimpact.orchestrator.campaign import run_campaign, run_scene
+from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.run import PointRunner, Session
 from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 BODY = """\

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from support.scenes import BEAM, CHAIN, YIELDING, changed, problems_of, scene_of, swept
 
-from vibroimpact.analysis.dataset import Direction, Outcome, check
+from vibroimpact.analysis.dataset import Outcome, check
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign.chunks import carried_attributes, carried_state
-from vibroimpact.orchestrator.run.dataset import dataset_of_runs
+from vibroimpact.orchestrator.run.dataset import dataset_of
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
+from vibroimpact.orchestrator.run.points import independent_points
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.models import KelvinVoigtStop
 
@@ -263,9 +264,7 @@ def test_swept_parameters_of_stops_and_loads_have_the_units_of_their_law() -> No
     keys = ("forcing.amplitude", "stop[1].stiffness", "stop[1].damping", "body.density", "stop[1].exponent")
     scene = scene_of(swept(nonlinear, *(f'"{key}" = {{ values = [1.0] }}' for key in keys)))
     record = empty_record(scene, Outcome.error, "", 0.0)
-    dataset = dataset_of_runs(
-        scene, dict.fromkeys(keys, np.ones(1)), [Direction.independent], [0], [record], {}
-    )
+    dataset = dataset_of(scene, independent_points(dict.fromkeys(keys, np.ones(1)), 1), [record], {})
     check(dataset)
     units = {
         name: dataset[name].attrs["units"]

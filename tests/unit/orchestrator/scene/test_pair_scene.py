@@ -11,8 +11,8 @@ from support.fmu_factory import mass
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.orchestrator.campaign.single_run import run_scene
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 

@@ -4,43 +4,34 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import cast
+
+import xarray as xr
 
 from vibroimpact.analysis.dataset import RunRecord, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    PointColumns,
-    columns_of_points,
-    dataset_of,
-    empty_part,
-    run_columns,
-    run_points,
-    tally,
-)
-from vibroimpact.orchestrator.campaign.progress import Progress
-from vibroimpact.orchestrator.campaign.provenance import provenance
-from vibroimpact.orchestrator.run import Runner, identity_of, named_runner
-from vibroimpact.orchestrator.run.dataset import with_constants_of
-from vibroimpact.orchestrator.run.many_points.loop import PointLoop, loop_of
+from vibroimpact.orchestrator.run import Runner
+from vibroimpact.orchestrator.run.dataset import dataset_of, empty_dataset, tally, with_constants_of
+from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
+from vibroimpact.orchestrator.run.progress import Progress
+from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
+from vibroimpact.orchestrator.running.opening import open_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, most_points, run_count
 
 PROGRESS_SECONDS = 0.5
 """Time after which progress is told of the points that are done, s."""
 
+Recorded = Sequence[RunRecord] | RunColumns
+
 
 def run_scene(
-    scene: Scene,
-    path: str | os.PathLike[str],
-    *,
-    runner: str = DEFAULT_RUNNER,
-    progress: Progress | None = None,
+    scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None
 ) -> Mapping[str, int]:
     """Run every point of a scene and write one dataset; nothing is kept when it is interrupted.
 
@@ -49,8 +40,6 @@ def run_scene(
     scene : Scene
     path : path
         The dataset to write, whole or not at all.
-    runner : str
-        The class that runs a point, as `module:name`.
     progress : Progress, optional
         Told how far it is, when there is more than one point.
 
@@ -68,21 +57,24 @@ def run_scene(
     refuse_adaptive(scene)
     refuse_large_results(scene)
     _refuse_unwritable(target)
-    opened = named_runner(scene, runner)
-    try:
-        # A dataset that cannot be made is found out before an hour of work, not after it.
-        with_constants_of(empty_part(scene), scene)
-        points = columns_of_points(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
-        records = _run_all(scene, opened, points, progress or Progress())
-        dataset = dataset_of(scene, points, records, provenance(scene, identity_of(opened)))
-        dataset = with_constants_of(dataset, scene)
-    finally:
-        opened.close()
+    with open_scene(scene) as runner:
+        dataset = run_whole(runner, progress)
     try:
         write_dataset(dataset, target)
     except OSError as error:
         raise _unwritable(target, error) from error
     return tally(dataset)
+
+
+def run_whole(runner: Runner, progress: Progress | None = None) -> xr.Dataset:
+    """Run every point of an opened scene; return their one-dimensional dataset, as it is written to a file."""
+    scene = runner.scene
+    # A dataset that cannot be made is found out before an hour of work, not after it.
+    with_constants_of(empty_dataset(scene), scene)
+    points = columns_of_points(expand(scene), 0, run_count(scene.sweep))
+    records = _run_all(runner, points, progress or Progress())
+    dataset = dataset_of(scene, points, records, provenance(scene, runner.identity))
+    return with_constants_of(dataset, scene)
 
 
 def refuse_adaptive(scene: Scene) -> None:
@@ -100,37 +92,27 @@ def refuse_adaptive(scene: Scene) -> None:
         )
 
 
-def _run_all(
-    scene: Scene, runner: Runner, points: PointColumns, progress: Progress
-) -> list[RunRecord] | RunColumns:
-    if len(points) > 1:
-        progress.begin(len(points), 0)
-    if scene.sweep and (loop := loop_of(scene, runner)) is not None:
-        return _run_in_loop(scene, runner, loop, points, progress)
-    records: list[RunRecord] = []
-    carried = None
-    for place in points.places():
-        done, carried = run_points(scene, runner, [place], carried)
-        records += done
-        if len(points) > 1:
-            progress.advance(1)
-    return records
-
-
-def _run_in_loop(
-    scene: Scene, runner: Runner, loop: PointLoop, points: PointColumns, progress: Progress
-) -> list[RunRecord] | RunColumns:
-    """Run points as a campaign does; now and then progress is told."""
-    pieces: list[RunColumns] = []
+def _run_all(runner: Runner, points: PointColumns, progress: Progress) -> Recorded:
+    """Run all points; now and then progress is told."""
+    if len(points) == 1:
+        return runner.rows(points)[0]
+    progress.begin(len(points), 0)
+    pieces: list[Recorded] = []
     done, carried = 0, None
     while done < len(points):
-        until = time.perf_counter() + PROGRESS_SECONDS
         left = points.chosen(slice(done, None))
-        columns, carried = run_columns(scene, runner, loop, left, carried, until)
-        pieces.append(columns if isinstance(columns, RunColumns) else columns_of(columns))
-        done += len(columns)
-        progress.advance(len(columns))
-    return joined(pieces)
+        found, carried = runner.rows(left, carried, time.perf_counter() + PROGRESS_SECONDS)
+        pieces.append(found)
+        done += len(found)
+        progress.advance(len(found))
+    return _together(pieces)
+
+
+def _together(pieces: Sequence[Recorded]) -> Recorded:
+    """Return what points recorded piece by piece."""
+    if any(isinstance(piece, RunColumns) for piece in pieces):
+        return joined([piece if isinstance(piece, RunColumns) else columns_of(piece) for piece in pieces])
+    return [record for piece in cast("Sequence[Sequence[RunRecord]]", pieces) for record in piece]
 
 
 def _refuse_unwritable(target: Path) -> None:
