@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from pathlib import Path
 
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
-from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene, prepared_scene, scene_with_modes
 from vibroimpact.orchestrator.campaign import SceneCost
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.run.progress import Progress, shown_progress
-from vibroimpact.orchestrator.running import run_scene
-from vibroimpact.returned import ONE_AT_A_TIME, in_memory
+from vibroimpact.orchestrator.running import run_in_memory, run_scene
+from vibroimpact.returned import ONE_AT_A_TIME
 
 
 def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True) -> xr.Dataset:
@@ -54,10 +52,7 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
         if target is not None:
             run_scene(chosen, target, progress=shown)
             return open_dataset(target)
-        with ScratchFolder("run") as folder:
-            file = Path(folder.name, "run.nc")
-            run_scene(chosen, file, progress=shown)
-            return in_memory(file)
+        return run_in_memory(chosen, progress=shown)
 
 
 def cost_of(scene: SceneLike) -> SceneCost:

@@ -7,10 +7,10 @@ This table is the only place where these facts are written. `writing` builds and
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -451,6 +451,18 @@ def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
     return {"long_name": rule.long_name, "units": unit, **rule.extra}
 
 
+class Named(Protocol):
+    """Variables of which some are coordinates: a dataset of xarray, or what becomes one."""
+
+    @property
+    def variables(self) -> Mapping[Any, xr.Variable]:
+        """All variables by name."""
+
+    @property
+    def coords(self) -> Iterable[Any]:
+        """The names of the coordinates."""
+
+
 def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the tables of the scene in the attributes of a dataset; none where there is none that can be read."""
     try:
@@ -459,16 +471,18 @@ def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:
         return {}
 
 
-def swept_names(dataset: xr.Dataset) -> tuple[str, ...]:
+def swept_names(dataset: Named) -> tuple[str, ...]:
     """Return the names of the swept parameters; those that a selection has made scalar are among them."""
+    # names of coordinates and their variables: an array of xarray for each of them would cost ten times as much
+    coordinates = {str(name): dataset.variables[name] for name in dataset.coords}
     # the axis of parameters that move together has the values of one of them
-    shared = {coordinate.attrs.get(SWEPT_ALONG) for coordinate in dataset.coords.values()}
+    shared = {coordinate.attrs.get(SWEPT_ALONG) for coordinate in coordinates.values()}
     return tuple(
-        str(name)
-        for name, coordinate in dataset.coords.items()
+        name
+        for name, coordinate in coordinates.items()
         if name not in RESERVED_NAMES | shared
         and coordinate.dtype.kind == "f"
-        and not _is_constant(coordinate.variable)
+        and not _is_constant(coordinate)
     )
 
 
@@ -498,11 +512,9 @@ def standing_for(dimension: str, columns: Mapping[str, NDArray[np.float64]]) -> 
     return next((name for name, values in columns.items() if np.unique(values).size == values.size), None)
 
 
-def constant_names(dataset: xr.Dataset) -> tuple[str, ...]:
+def constant_names(dataset: Named) -> tuple[str, ...]:
     """Return the names of the numbers of the scene that are the same for all runs."""
-    return tuple(
-        str(name) for name, coordinate in dataset.coords.items() if _is_constant(coordinate.variable)
-    )
+    return tuple(str(name) for name in dataset.coords if _is_constant(dataset.variables[name]))
 
 
 def _is_constant(coordinate: xr.Variable) -> bool:

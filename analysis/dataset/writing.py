@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import netCDF4
@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
-from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable, wrapped
+from vibroimpact.analysis.dataset.assembling import Described, assembled, loaded_variable, wrapped
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.columns import (
     OF_ALL_PERIODS,
@@ -39,15 +39,14 @@ from vibroimpact.analysis.dataset.schema import (
     RunRecord,
     UnitSystem,
     attributes_of,
-    constant_names,
     file_names,
     known_unit,
     names_list,
     quantity_unit,
     sample_rule,
-    swept_names,
     unit_in,
 )
+from vibroimpact.analysis.dataset.storing import Stored, stored_variables
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.analysis.files.open_files import netcdf_lock
@@ -75,6 +74,7 @@ def build_dataset(
     connections: Sequence[str] = (),
     compared: Sequence[str] = (),
     measured: Mapping[str, NDArray[Any]] | None = None,
+    constants: Mapping[str, Described] | None = None,
 ) -> xr.Dataset:
     """Build the one-dimensional dataset of some runs, as it is written to a file.
 
@@ -112,6 +112,8 @@ def build_dataset(
     measured : mapping of str to ndarray, shape (run,), optional
         What is known of runs that a rig has measured, or that are orbits: some of `schema.MEASURED_COLUMNS`, or
         `schema.ORBIT_COLUMNS`.
+    constants : mapping of str to tuple, optional
+        Numbers that are the same for all runs, as `described_constants` gives them.
 
     Returns
     -------
@@ -160,7 +162,7 @@ def build_dataset(
     }
     named: tuple[str, ...] = ("run_index", "direction")
     named += (("connection",) if connections else ()) + (("compared",) if compared else ())
-    coords = {name: variables.pop(name) for name in named} | swept
+    coords = {name: variables.pop(name) for name in named} | swept | dict(constants or {})
     return assembled(variables, coords, described | dict(attrs or {}))
 
 
@@ -185,19 +187,22 @@ def with_constants(
     DatasetError
         If the unit of one is not known.
     """
-    units = dataset.attrs["units_system"]
-    return dataset.assign_coords(
-        wrapped(
-            {
-                name: (
-                    (),
-                    np.array(value, dtype=float),
-                    _quantity_attributes(name, units, unit_of or {}) | NOT_SWEPT,
-                )
-                for name, value in constants.items()
-            }
+    described = described_constants(constants, dataset.attrs["units_system"], unit_of)
+    return dataset.assign_coords(wrapped(described))
+
+
+def described_constants(
+    constants: Mapping[str, float], units: UnitSystem, unit_of: Mapping[str, str] | None = None
+) -> dict[str, Described]:
+    """Return the variables of numbers that are the same for all runs, see `with_constants`."""
+    return {
+        name: (
+            (),
+            np.array(value, dtype=float),
+            _quantity_attributes(name, units, unit_of or {}) | NOT_SWEPT,
         )
-    )
+        for name, value in constants.items()
+    }
 
 
 def _check_lengths(
@@ -411,9 +416,8 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
 
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
-    linked = " ".join(("run_index", "direction", *swept_names(dataset), *constant_names(dataset)))
     # what is read of another file wants the lock, too
-    variables = {name: loaded_variable(variable) for name, variable in dataset.variables.items()}
+    variables = [replace(one, variable=loaded_variable(one.variable)) for one in stored_variables(dataset)]
     with netcdf_lock():
         file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
         # Every value is written below: filling first would write everything twice.
@@ -421,42 +425,36 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
         file.setncatts(dict(dataset.attrs))
         for name, size in dataset.sizes.items():
             file.createDimension(str(name), size)
-        for name, variable in variables.items():
-            is_data = variable.dims[:1] == ("run",) and name not in dataset.coords
-            labels = " connection" if "interface" in variable.dims else ""
-            labels += " compared" if "comparison" in variable.dims else ""
-            _store(file, str(name), variable, compression, linked + labels if is_data else None)
+        for variable in variables:
+            _store(file, variable, compression)
         return memoryview(file.close())
 
 
-def _store(
-    file: netCDF4.Dataset, name: str, variable: xr.Variable, compression: int, linked: str | None
-) -> None:
+def _store(file: netCDF4.Dataset, one: Stored, compression: int) -> None:
     """Store one variable with its attributes; floats mark what is missing by NaN."""
+    variable = one.variable
     is_text = variable.dtype.kind == "O"
-    # CF forbids missing values in coordinates, so these have no fill value.
-    may_miss = variable.dtype.kind == "f" and (linked is not None or variable.dims[:1] not in ((), ("run",)))
     kind: Any = str if is_text else variable.dtype
     level: Any = compression
-    stored = file.createVariable(
-        name,
+    placed = file.createVariable(
+        one.name,
         kind,
         tuple(map(str, variable.dims)),
-        fill_value=np.nan if may_miss else None,
+        fill_value=np.nan if one.may_miss else None,
         compression="zlib" if compression and not is_text else None,
         complevel=level,
         shuffle=True,
         chunksizes=[min(_TEXT_CHUNK, variable.size)] if is_text and variable.size else None,
     )
-    stored.setncatts(dict(variable.attrs) if linked is None else {**variable.attrs, "coordinates": linked})
+    placed.setncatts({**variable.attrs, "coordinates": one.linked} if one.linked else dict(variable.attrs))
     if is_text:
-        _store_texts(stored, variable.values)
+        _store_texts(placed, variable.values)
     elif variable.size:
-        stored[...] = variable.values
+        placed[...] = variable.values
 
 
-def _store_texts(stored: netCDF4.Variable[Any], texts: NDArray[Any]) -> None:
+def _store_texts(placed: netCDF4.Variable[Any], texts: NDArray[Any]) -> None:
     """Store what is not empty: what was never stored reads as empty, and takes no space."""
     places = np.flatnonzero(texts.astype(bool))
     for block in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else ():
-        stored[block[0] : block[-1] + 1] = texts[block]
+        placed[block[0] : block[-1] + 1] = texts[block]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from vibroimpact.analysis.dataset import (
     build_dataset,
     file_names,
     marked,
-    with_constants,
 )
+from vibroimpact.analysis.dataset.assembling import Described, wrapped
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
+from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
 from vibroimpact.orchestrator.run.empty_record import empty_record, sample_variables
@@ -36,47 +38,100 @@ STROBE = ("strobe_displacement", "strobe_velocity")
 FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1", "mode": "N"}
 
 
+class DatasetForm:
+    """What a scene says of its dataset, found once: names, units, groups, and the numbers that it does not sweep.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._names = coordinate_names(scene)
+        general = scene.general
+        self._said: dict[str, Any] = {
+            "sample_variables": sample_variables(scene),
+            "units": scene.units,
+            "unit_of": _units(scene, self._names),
+            "omit": _omitted(scene),
+            "each_period": scene.record.each_period,
+            "event_components": [c.name for c in general.components] if general is not None else (),
+            "connections": _energy_connections(scene),
+            "compared": compared_names(scene),
+        }
+        stored = dict(zip(sample_variables(scene), stored_samples(scene), strict=True))
+        of_channels = channel_attributes(scene).items()
+        self._attributes = {stored[name]: own for name, own in of_channels} | _described(scene, self._names)
+
+    def dataset(
+        self,
+        points: PointColumns,
+        records: Sequence[RunRecord] | RunColumns,
+        attrs: Mapping[str, Any],
+        *,
+        constants: bool = False,
+    ) -> xr.Dataset:
+        """Return the one-dimensional dataset of points and what became of them; impossible values are marked.
+
+        Parameters
+        ----------
+        points : PointColumns
+        records : sequence of RunRecord, or RunColumns
+            What became of each.
+        attrs : mapping
+            Attributes of the file.
+        constants : bool
+            Whether what the scene does not sweep is among the coordinates.
+        """
+        scene = self._scene
+        if scene.channels and not isinstance(records, RunColumns):
+            records = converted_records(scene, points.values, points.direction, records)
+        dataset = build_dataset(
+            records,
+            coordinates={name: points.values[key] for key, name in self._names.items()},
+            direction=points.direction,
+            run_index=points.index,
+            attrs=attrs,
+            constants=self.constants() if constants else None,
+            **self._said,
+        )
+        for name, attributes in self._attributes.items():
+            dataset.variables[name].attrs.update(attributes)
+        return marked(dataset)
+
+    def refuse_impossible(self) -> None:
+        """Raise DatasetError where no dataset of the scene can be made, whatever its points record."""
+        point = columns_of_points(expand(self._scene), 0, 1)
+        self.dataset(point, [empty_record(self._scene, Outcome.error, "", 0.0)], {}, constants=True)
+
+    def constants(self) -> dict[str, Described]:
+        """Return what the scene does not sweep as scalar coordinates."""
+        return {
+            name: (dims, value.copy(), dict(attrs)) for name, (dims, value, attrs) in self._constants.items()
+        }
+
+    @cached_property
+    def _constants(self) -> dict[str, Described]:
+        scene, numbers = self._scene, self._scene.constants()
+        names = constant_file_names(scene, numbers)
+        named = {file: numbers[key] for key, file in names.items()}
+        found = described_constants(named, scene.units, _units(scene, names))
+        own = _described(scene, names)
+        return {
+            name: (dims, value, {**attrs, **own.get(name, {})})
+            for name, (dims, value, attrs) in found.items()
+        }
+
+
 def dataset_of(
     scene: Scene,
     points: PointColumns,
     records: Sequence[RunRecord] | RunColumns,
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Return the one-dimensional dataset of points and what became of them; those with impossible values are marked.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene they belong to.
-    points : PointColumns
-    records : sequence of RunRecord, or RunColumns
-        What became of each.
-    attrs : mapping
-        Attributes of the file.
-    """
-    names = coordinate_names(scene)
-    if scene.channels and not isinstance(records, RunColumns):
-        records = converted_records(scene, points.values, points.direction, records)
-    dataset = build_dataset(
-        records,
-        coordinates={name: points.values[key] for key, name in names.items()},
-        direction=points.direction,
-        run_index=points.index,
-        sample_variables=sample_variables(scene),
-        units=scene.units,
-        attrs=attrs,
-        unit_of=_units(scene, names),
-        omit=_omitted(scene),
-        each_period=scene.record.each_period,
-        event_components=[c.name for c in scene.general.components] if scene.general is not None else (),
-        connections=_energy_connections(scene),
-        compared=compared_names(scene),
-    )
-    for name, attributes in channel_attributes(scene).items():
-        dataset[
-            dict(zip(sample_variables(scene), stored_samples(scene), strict=True))[name]
-        ].attrs |= attributes
-    return marked(_described(dataset, scene, names))
+    """Return the one-dimensional dataset of points of a scene, see `DatasetForm.dataset`."""
+    return DatasetForm(scene).dataset(points, records, attrs)
 
 
 def empty_dataset(scene: Scene) -> xr.Dataset:
@@ -91,21 +146,18 @@ def tally(dataset: xr.Dataset) -> dict[str, int]:
     return {Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)}
 
 
-def _described(dataset: xr.Dataset, scene: Scene, names: Mapping[str, str]) -> xr.Dataset:
-    for file, long_name in _long_names(scene, names).items():
-        dataset[file].attrs["long_name"] = long_name
+def _described(scene: Scene, names: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Return the attributes that numbers of a scene have beside name and unit, by their names in the file."""
+    found = {file: {"long_name": long_name} for file, long_name in _long_names(scene, names).items()}
     for key, dimension in shared_dimensions(scene.sweep).items():
         if key in names:
-            dataset[names[key]].attrs[SWEPT_ALONG] = dimension
-    return dataset
+            found.setdefault(names[key], {})[SWEPT_ALONG] = dimension
+    return found
 
 
 def with_constants_of(dataset: xr.Dataset, scene: Scene) -> xr.Dataset:
     """Return the dataset of a scene's runs with what the scene does not sweep as scalar coordinates."""
-    constants = scene.constants()
-    names = constant_file_names(scene, constants)
-    named = {file: constants[key] for key, file in names.items()}
-    return _described(with_constants(dataset, named, unit_of=_units(scene, names)), scene, names)
+    return dataset.assign_coords(wrapped(DatasetForm(scene).constants()))
 
 
 def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:

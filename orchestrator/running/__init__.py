@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from vibroimpact.orchestrator.running.opening import open_scene
-from vibroimpact.orchestrator.running.whole import run_scene
+from vibroimpact.orchestrator.running.whole import run_in_memory, run_scene
 
-__all__ = ["open_scene", "run_scene"]
+__all__ = ["open_scene", "run_in_memory", "run_scene"]

@@ -10,17 +10,17 @@ from typing import cast
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset import RunRecord, write_dataset
+from vibroimpact.analysis.dataset import Outcome, RunRecord, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
+from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.run import Runner
-from vibroimpact.orchestrator.run.dataset import dataset_of, empty_dataset, tally, with_constants_of
+from vibroimpact.orchestrator.run.dataset import tally
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.run.progress import Progress
-from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
-from vibroimpact.orchestrator.running.opening import open_scene
+from vibroimpact.orchestrator.running.kept import OpenedScene, opened_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, most_points, run_count
 
@@ -57,8 +57,8 @@ def run_scene(
     refuse_adaptive(scene)
     refuse_large_results(scene)
     _refuse_unwritable(target)
-    with open_scene(scene) as runner:
-        dataset = run_whole(runner, progress)
+    with opened_scene(scene) as opened:
+        dataset = run_whole(opened, progress)
     try:
         write_dataset(dataset, target)
     except OSError as error:
@@ -66,15 +66,34 @@ def run_scene(
     return tally(dataset)
 
 
-def run_whole(runner: Runner, progress: Progress | None = None) -> xr.Dataset:
+def run_in_memory(scene: Scene, *, progress: Progress | None = None) -> xr.Dataset:
+    """Run every point of a scene and return what `open_dataset` gives of its file, without one.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress : Progress, optional
+        Told how far it is, when there is more than one point.
+
+    Raises
+    ------
+    UsageError
+        When the dataset would be larger than memory, or the sweep is adaptive.
+    """
+    refuse_adaptive(scene)
+    refuse_large_results(scene)
+    with opened_scene(scene) as opened:
+        return opened_in_memory(run_whole(opened, progress))
+
+
+def run_whole(opened: OpenedScene, progress: Progress | None = None) -> xr.Dataset:
     """Run every point of an opened scene; return their one-dimensional dataset, as it is written to a file."""
-    scene = runner.scene
-    # A dataset that cannot be made is found out before an hour of work, not after it.
-    with_constants_of(empty_dataset(scene), scene)
+    scene, form = opened.scene, opened.form
     points = columns_of_points(expand(scene), 0, run_count(scene.sweep))
-    records = _run_all(runner, points, progress or Progress())
-    dataset = dataset_of(scene, points, records, provenance(scene, runner.identity))
-    return with_constants_of(dataset, scene)
+    records = _run_all(opened.runner, points, progress or Progress())
+    dataset = form.dataset(points, records, opened.attributes, constants=True)
+    opened.failed = bool((dataset.variables["outcome"].values == Outcome.error).any())
+    return dataset
 
 
 def refuse_adaptive(scene: Scene) -> None:

@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.running import open_scene
+from vibroimpact.orchestrator.running.kept import OpenedScene
 from vibroimpact.orchestrator.running.whole import run_whole
 from vibroimpact.orchestrator.scene import Scene
 
@@ -75,7 +76,7 @@ class BusyRunner(Runner):
 
 def run_busy(scene: Scene, path: Path) -> None:
     """Write the dataset of all points of a scene, run in this process."""
-    write_dataset(run_whole(BusyRunner(scene)), path)
+    write_dataset(run_whole(OpenedScene(scene, BusyRunner(scene))), path)
 
 
 class SceneRunner(BusyRunner):

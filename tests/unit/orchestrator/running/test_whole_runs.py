@@ -36,7 +36,7 @@ def test_a_scene_is_opened_as_it_says_in_this_process_or_in_one_of_its_own() -> 
     with open_scene(scene_of(text)) as plain, open_scene(scene_of(text), execution="coupled") as coupled:
         assert isinstance(plain, PointRunner)
         assert coupled.execution == "coupled"
-    with open_scene(scene_of(f"{text}\n[execution]\nguard = true\n")) as guarded:
+    with open_scene(scene_of(f"{text}\n[execution]\nhow = 'coupled'\nguard = true\n")) as guarded:
         assert isinstance(guarded, GuardedRunner)
 
 
@@ -51,6 +51,6 @@ def test_progress_is_told_of_every_point_of_a_sweep(tmp_path: Path, path: str) -
 
 def test_progress_is_not_told_of_a_single_run(tmp_path: Path) -> None:
     told = Counted()
-    run_scene(scene_of(frequency_text(1)), tmp_path / "run.nc", progress=told)
+    run_scene(scene_of(frequency_text(2).partition("[sweep]")[0]), tmp_path / "run.nc", progress=told)
     assert not told.totals
     assert not told.steps

@@ -1,0 +1,293 @@
+"""The runs of a dataset on the real dimensions of their sweep, with the ragged arrays beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
+from vibroimpact.analysis.dataset.schema import (
+    RAGGED,
+    RULES,
+    SWEPT_ALONG,
+    Direction,
+    Named,
+    constant_names,
+    standing_for,
+    swept_names,
+)
+
+# A sweep that is no grid (scattered points) would waste memory on a grid; then `run` stays the dimension.
+_LARGEST_GRID_PER_RUN = 10
+
+
+class _RunArray(BackendArray):
+    """A per-run variable laid out on the grid, read as a whole when first used."""
+
+    def __init__(
+        self, read: Callable[[], NDArray[Any]], run_id: NDArray[np.int32], like: xr.Variable
+    ) -> None:
+        self._read = read
+        self._run_id = run_id
+        self.shape = (*run_id.shape, *like.shape[1:])
+        self.dtype = like.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(
+            key, self.shape, indexing.IndexingSupport.BASIC, lambda basic: self._values[basic]
+        )
+
+    def now(self) -> NDArray[Any]:
+        """Return the values as a reader of all of them gets them; one text alone has a length."""
+        return np.asarray(self._values[()])
+
+    @cached_property
+    def _values(self) -> NDArray[Any]:
+        # one run alone is a bare value: text would stay so
+        values = np.array(self._read()[self._run_id], dtype=self.dtype)
+        missing = self._run_id < 0
+        if missing.any():
+            values[missing] = {"f": np.nan, "i": -1}.get(values.dtype.kind, "")
+        return values
+
+
+class Flat(Named, Protocol):
+    """Runs one after the other, as a file has them: a dataset of xarray, or what was read of a file."""
+
+    @property
+    def sizes(self) -> Mapping[Any, int]:
+        """Size of each dimension."""
+
+    @property
+    def attrs(self) -> Mapping[Any, Any]:
+        """Attributes of the file."""
+
+
+def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
+    """Return runs on the dimensions of their sweep, with the ragged arrays beside them.
+
+    Parameters
+    ----------
+    flat : xarray.Dataset or Read
+    lazily : bool
+        Whether a variable is laid out when it is first used.
+    """
+    labelled = _with_labels(flat)
+    dims, axes, scalars, run_id = _grid(labelled)
+    swept, constants = swept_names(labelled), constant_names(labelled)
+    place = _Placing(dims, run_id, lazily)
+    variables: dict[str, xr.Variable] = {}
+    # The order of the schema reads better than the alphabet; sampled variables come last.
+    order = [name for name in RULES if name in labelled.variables]
+    for name in [*order, *(name for name in labelled.variables if name not in RULES)]:
+        variable = labelled.variables[name]
+        if name in (*swept, *constants, "direction"):
+            continue
+        variables[str(name)] = place.per_run(variable) if variable.dims[:1] == ("run",) else variable
+    variables["run_id"] = new_variable(
+        dims, run_id, {"long_name": "position of the run in the file", "units": "1"}
+    )
+    variables |= _row_owners(labelled)
+    if "displacement_max" in labelled.variables:
+        variables["displacement_range"] = _displacement_range(labelled, place)
+    coordinates = {"run_index": variables.pop("run_index")}
+    coordinates |= {name: variables.pop(name) for name in ("connection", "compared") if name in variables}
+    coordinates |= {name: labelled.variables[name] for name in constants}
+    if dims == ("run",):
+        coordinates |= {name: labelled.variables[name] for name in swept}
+        coordinates["direction"] = new_variable(
+            "run", _direction_names(labelled), _plain(labelled.variables["direction"])
+        )
+        axes = {}
+    return xr.Dataset(variables, coords=coordinates | axes | scalars, attrs=labelled.attrs)
+
+
+def _with_labels(flat: Flat) -> Flat:
+    """Return runs with names as dimensions, where some are: in memory they select."""
+    renamed = {"connection": "interface", "compared": "comparison"}
+    if not renamed.keys() & set(flat.variables):
+        return flat
+    if isinstance(flat, xr.Dataset):
+        dataset = flat
+    else:
+        data = dict(flat.variables)
+        coords = {name: data.pop(name) for name in flat.coords}
+        dataset = xr.Dataset(data, coords=coords, attrs=flat.attrs)
+    return dataset.swap_dims({stored: name for name, stored in renamed.items() if name in flat.variables})
+
+
+@dataclass(frozen=True, slots=True)
+class _Placing:
+    """How per-run variables are laid out: the dimensions, the run at each point, and when."""
+
+    dims: tuple[str, ...]
+    run_id: NDArray[np.int32]
+    lazily: bool
+
+    def per_run(self, variable: xr.Variable) -> xr.Variable:
+        """Return a per-run variable on the grid."""
+        attributes = {
+            key: value for key, value in variable.attrs.items() if key not in ("_FillValue", "coordinates")
+        }
+        array = _RunArray(lambda: np.asarray(variable.values), self.run_id, variable)
+        return self.laid_out((*self.dims, *variable.dims[1:]), array, attributes)
+
+    def laid_out(self, dims: tuple[Any, ...], array: _RunArray, attributes: Mapping[Any, Any]) -> xr.Variable:
+        """Return the variable of an array, now or when it is first used."""
+        if not self.lazily:
+            return new_variable(dims, array.now(), attributes)
+        return xr.Variable(dims, indexing.LazilyIndexedArray(array), attributes)
+
+
+def _displacement_range(flat: Flat, place: _Placing) -> xr.Variable:
+    """Return the largest minus the smallest displacement over the recorded periods, NaN periods aside."""
+
+    def read() -> NDArray[np.float64]:
+        largest = np.fmax.reduce(flat.variables["displacement_max"].values, axis=1, initial=-np.inf)
+        smallest = np.fmin.reduce(flat.variables["displacement_min"].values, axis=1, initial=np.inf)
+        return np.where(largest >= smallest, largest - smallest, np.nan)
+
+    attributes = {
+        "long_name": "displacement range over the recorded periods",
+        "units": flat.variables["displacement_max"].attrs["units"],
+    }
+    array = _RunArray(read, place.run_id, flat.variables["final_displacement"])
+    return place.laid_out(place.dims, array, attributes)
+
+
+def _row_owners(flat: Flat) -> dict[str, xr.Variable]:
+    """Return, for each row of each ragged array, the run_id of the run it belongs to."""
+    runs = np.arange(flat.sizes["run"], dtype=np.int32)
+    return {
+        f"{dimension}_run": new_variable(
+            dimension,
+            np.repeat(runs, flat.variables[count].values),
+            {"long_name": f"run_id of the run of each {dimension}", "units": "1"},
+        )
+        for dimension, count in RAGGED.items()
+        if count in flat.variables
+    }
+
+
+def _grid(
+    flat: Flat,
+) -> tuple[tuple[str, ...], dict[str, xr.Variable], dict[str, xr.Variable], NDArray[np.int32]]:
+    """Return the dimensions of the sweep, coordinates along them, scalar ones, and the run at each point (-1: none)."""
+    axes: dict[str, xr.Variable] = {}
+    sizes: dict[str, int] = {}
+    scalars: dict[str, xr.Variable] = {}
+    places: list[NDArray[np.intp]] = []
+    directions = flat.variables["direction"].values
+    names = _direction_names(flat)
+    if directions.size and (directions != Direction.independent).any():
+        present, place = _distinct(directions)
+        labels = np.array([Direction(int(value)).name for value in present])
+        axes["direction"] = new_axis("direction", labels, _plain(flat.variables["direction"]))
+        sizes["direction"] = labels.size
+        places.append(place)
+    elif directions.size:
+        scalars["direction"] = new_variable((), np.asarray(names[0]), _plain(flat.variables["direction"]))
+    for dimension, names_along in _swept_along(flat).items():
+        values, place = _distinct_points([flat.variables[name] for name in names_along])
+        for name, column in zip(names_along, values.T, strict=True):
+            new = new_axis if name == dimension else new_variable
+            axes[name] = new(dimension, column, flat.variables[name].attrs)
+        sizes[dimension] = len(values)
+        places.append(place)
+    axes |= shared_axes(axes)
+    run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])
+    if run_id is None:
+        return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
+    return tuple(sizes), axes, scalars, run_id
+
+
+def shared_axes(columns: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+    """Return the coordinate of each dimension that parameters share: values of one of them, or numbers from 0."""
+    along: dict[str, dict[str, NDArray[np.float64]]] = {}
+    for name, column in columns.items():
+        if column.attrs.get(SWEPT_ALONG) in column.dims:
+            along.setdefault(column.attrs[SWEPT_ALONG], {})[name] = column.values
+    axes: dict[str, xr.Variable] = {}
+    for dimension, members in along.items():
+        chosen = standing_for(dimension, members)
+        if chosen is None:
+            numbers = np.arange(len(next(iter(members.values()))))
+            attributes = {"long_name": f"place along {dimension}", "units": "1"}
+            axes[dimension] = new_axis(dimension, numbers, attributes)
+        else:
+            attributes = {key: value for key, value in columns[chosen].attrs.items() if key != SWEPT_ALONG}
+            axes[dimension] = new_axis(dimension, members[chosen], attributes)
+    return axes
+
+
+def _swept_along(flat: Flat) -> dict[str, list[str]]:
+    """Return the swept parameters along each dimension: those that move together share one."""
+    found: dict[str, list[str]] = {}
+    for name in _in_order_of_the_scene(flat):
+        found.setdefault(flat.variables[name].attrs.get(SWEPT_ALONG, name), []).append(name)
+    return found
+
+
+def _distinct_points(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the points that runs have along a dimension, shape (point, parameter), and at which each run is.
+
+    One parameter ascends; several that move together are in the order of the runs.
+    """
+    if len(columns) == 1 and SWEPT_ALONG not in columns[0].attrs:
+        values, place = _distinct(columns[0].values)
+        return values[:, None], place
+    rows = np.stack([column.values for column in columns], axis=1)
+    values, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size)
+    return values[order], rank[place.reshape(-1)]
+
+
+def _distinct(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    """Return the values that occur, ascending, and the place of each element among them.
+
+    By a table of hashes: sorting 10^6 values, as `np.unique` does, takes ten times as long.
+    """
+    place, present = pd.factorize(values, sort=True, use_na_sentinel=False)
+    return np.asarray(present), place
+
+
+def _in_order_of_the_scene(flat: Flat) -> list[str]:
+    """Return the swept parameters as the scene lists them: variables of a file come by the alphabet."""
+    linked = str(flat.variables["outcome"].encoding.get("coordinates", "")).split()
+    return sorted(swept_names(flat), key=lambda name: linked.index(name) if name in linked else len(linked))
+
+
+def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
+    """Return the run at each grid point, or None when the runs are no grid."""
+    size = int(np.prod(shape, dtype=np.int64))
+    if runs == 0 or size > _LARGEST_GRID_PER_RUN * runs:
+        return None
+    where = np.ravel_multi_index(tuple(places), shape) if shape else np.zeros(runs, dtype=np.intp)
+    if np.bincount(where, minlength=1).max() > 1:
+        return None
+    run_id = np.full(size, -1, dtype=np.int32)
+    run_id[where] = np.arange(runs, dtype=np.int32)
+    return run_id.reshape(shape)
+
+
+def _direction_names(flat: Flat) -> NDArray[np.str_]:
+    """Return the direction of each run as a word."""
+    names = np.array([member.name for member in Direction])
+    words: NDArray[np.str_] = names[flat.variables["direction"].values]
+    return words
+
+
+def _plain(variable: xr.Variable) -> dict[str, Any]:
+    """Return the attributes of a flag variable that is opened as words."""
+    return {"long_name": variable.attrs.get("long_name", RULES["direction"].long_name)}

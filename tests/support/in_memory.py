@@ -1,0 +1,42 @@
+"""Whether a run in memory is what the file of the same run gives, to types, order and bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset import open_dataset, write_dataset
+from vibroimpact.analysis.dataset.assembling import loaded
+from vibroimpact.analysis.dataset.reading import opened_in_memory
+from vibroimpact.orchestrator.running.kept import opened_scene
+from vibroimpact.orchestrator.running.whole import run_whole
+from vibroimpact.orchestrator.scene import Scene
+
+
+def assert_memory_is_file(scene: Scene) -> xr.Dataset:
+    """Run a scene; compare what is made in memory with what its file gives; return the former."""
+    with opened_scene(scene) as opened:
+        flat = run_whole(opened)
+    found = opened_in_memory(flat)
+    with TemporaryDirectory() as folder:
+        write_dataset(flat, Path(folder, "run.nc"))
+        with open_dataset(Path(folder, "run.nc")) as opened_file:
+            wanted = loaded(opened_file)
+    xr.testing.assert_identical(found, wanted)
+    assert list(found.variables) == list(wanted.variables)
+    assert list(found.dims) == list(wanted.dims)
+    assert types(found.attrs) == types(wanted.attrs)
+    for name, variable in wanted.variables.items():
+        own = found.variables[name]
+        assert (own.dtype, type(own)) == (variable.dtype, type(variable)), name
+        assert types(own.attrs) == types(variable.attrs), name
+        if variable.dtype.kind != "O":
+            assert own.values.tobytes() == variable.values.tobytes(), name
+    return found
+
+
+def types(attributes: dict[str, object]) -> dict[str, type]:
+    """Return the type of each attribute."""
+    return {name: type(value) for name, value in attributes.items()}
