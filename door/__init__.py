@@ -81,6 +81,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.service.client import Service as Service
     from vibroimpact.simulation import cost_of as cost_of
     from vibroimpact.simulation import run as run
+    from vibroimpact.simulation import runner as runner
     from vibroimpact.sobol import sensitivity as sensitivity
     from vibroimpact.studies import accuracy as accuracy
     from vibroimpact.studies import effects as effects
@@ -126,7 +127,7 @@ _NAMES = {
     "orchestrator.scene": ("Scene",),
     "replays": ("replay",),
     "service.client": ("Service",),
-    "simulation": ("cost_of", "run"),
+    "simulation": ("cost_of", "run", "runner"),
     "sobol": ("sensitivity",),
     "studies": ("accuracy", "effects"),
 }

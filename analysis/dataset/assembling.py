@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from typing import Any, TypeAlias
+from collections.abc import Hashable, Iterable, Mapping
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,18 @@ from xarray.core.indexing import PandasIndexingAdapter
 
 Described: TypeAlias = tuple[tuple[Hashable, ...], Any, Mapping[Any, Any]]
 """Dimensions, values and attributes of a variable."""
+
+
+class Named(Protocol):
+    """Variables of which some are coordinates: a dataset of xarray, or what becomes one."""
+
+    @property
+    def variables(self) -> Mapping[Any, xr.Variable]:
+        """All variables by name."""
+
+    @property
+    def coords(self) -> Iterable[Any]:
+        """The names of the coordinates."""
 
 
 def assembled(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.schema import (
     IMPACT_COLUMNS,
     PERIOD_COLUMNS,
+    RAGGED,
+    RULES,
     STICK_COLUMNS,
     RunRecord,
     names_list,
@@ -82,6 +84,40 @@ class RunColumns:
             return None if values is None else values[runs]
 
         return RunColumns(*(some(getattr(self, name)) for name in self.__slots__))
+
+
+def arrays_of(columns: RunColumns, omit: Collection[str] = (), *, each_period: bool = True) -> dict[str, Any]:
+    """Return what runs recorded as arrays, by their names in a dataset and in its types.
+
+    Parameters
+    ----------
+    columns : RunColumns
+    omit : collection of str
+        Per-period variables that are left out.
+    each_period : bool
+        False: one element stands for all recorded periods of a run, see `of_all_periods`.
+    """
+    found: dict[str, Any] = {
+        "outcome": columns.outcome,
+        "message": columns.message,
+        "point_seconds": columns.seconds,
+        "final_displacement": columns.final_displacement,
+        "final_velocity": columns.final_velocity,
+        "final_phase": columns.final_phase,
+    }
+    if columns.final_state is not None:
+        found["final_state"] = columns.final_state
+    if columns.periods is not None:
+        periods = columns.periods if each_period else of_all_periods(columns.periods)
+        of_periods = zip(PERIOD_COLUMNS, np.moveaxis(periods, -1, 0), strict=True)
+        found |= {name: values for name, values in of_periods if name not in omit}
+    for dimension, rows, names in (
+        ("impact", columns.impacts, IMPACT_COLUMNS),
+        ("stick", columns.sticks, STICK_COLUMNS),
+    ):
+        if rows is not None:
+            found |= {RAGGED[dimension]: rows.count, **dict(zip(names, rows.rows.T, strict=True))}
+    return {name: np.ascontiguousarray(values, dtype=RULES[name].dtype) for name, values in found.items()}
 
 
 def columns_of(records: Sequence[RunRecord]) -> RunColumns:

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
+from vibroimpact.analysis.dataset.assembling import Named, new_axis, new_variable
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
     RULES,
     SWEPT_ALONG,
     Direction,
-    Named,
     constant_names,
     standing_for,
     swept_names,

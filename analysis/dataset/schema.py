@@ -7,10 +7,10 @@ This table is the only place where these facts are written. `writing` builds and
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from vibroimpact.fmus.safe_toml import parse_toml
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from vibroimpact.analysis.dataset.assembling import Named
 
 CONVENTIONS = "CF-1.11"
 SCHEMA_VERSION = "1"
@@ -449,18 +451,6 @@ def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
     # Wall time is measured in seconds in every system of units.
     unit = rule.unit if name == "point_seconds" else unit_in(system, rule.unit)
     return {"long_name": rule.long_name, "units": unit, **rule.extra}
-
-
-class Named(Protocol):
-    """Variables of which some are coordinates: a dataset of xarray, or what becomes one."""
-
-    @property
-    def variables(self) -> Mapping[Any, xr.Variable]:
-        """All variables by name."""
-
-    @property
-    def coords(self) -> Iterable[Any]:
-        """The names of the coordinates."""
 
 
 def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:

@@ -19,22 +19,19 @@ from vibroimpact.analysis.dataset.columns import (
     OF_ALL_PERIODS,
     Ragged,
     RunColumns,
+    arrays_of,
     columns_of,
-    of_all_periods,
     ragged,
 )
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
-    IMPACT_COLUMNS,
     NOT_SWEPT,
-    PERIOD_COLUMNS,
     RAGGED,
     RESERVED_NAMES,
     RULES,
     SCHEMA_VERSION,
     SCORE_COLUMNS,
-    STICK_COLUMNS,
     Direction,
     RunRecord,
     UnitSystem,
@@ -136,10 +133,8 @@ def build_dataset(
     """
     _check_lengths(len(runs), coordinates, direction, run_index)
     columns, records = (runs, ()) if isinstance(runs, RunColumns) else (columns_of(runs), runs)
-    variables = _run_variables(columns, direction, run_index, units)
-    variables |= _period_variables(columns.periods, units, omit, each_period)
-    variables |= _ragged_variables("impact", columns.impacts, IMPACT_COLUMNS, units)
-    variables |= _ragged_variables("stick", columns.sticks, STICK_COLUMNS, units)
+    variables = _described({"run_index": run_index, "direction": direction}, units)
+    variables |= _column_variables(columns, units, omit, each_period)
     samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
     variables |= _sample_variables(records, samples)
     variables |= _event_variables(records, event_components, units)
@@ -228,28 +223,6 @@ def _check_lengths(
         raise DatasetError("\n".join(problems))
 
 
-def _run_variables(
-    columns: RunColumns,
-    direction: Sequence[Direction] | NDArray[np.int8],
-    run_index: Sequence[int] | NDArray[np.integer[Any]],
-    units: UnitSystem,
-) -> _Variables:
-    """Return the variables that every run has, and its whole state where it has one."""
-    values = {
-        "run_index": run_index,
-        "direction": direction,
-        "outcome": columns.outcome,
-        "message": columns.message,
-        "point_seconds": columns.seconds,
-        "final_displacement": columns.final_displacement,
-        "final_velocity": columns.final_velocity,
-        "final_phase": columns.final_phase,
-    }
-    if columns.final_state is not None:
-        values["final_state"] = columns.final_state
-    return _described(values, units)
-
-
 def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
     """Return values as variables of the schema: with its dimensions, types and attributes."""
     return {
@@ -262,18 +235,13 @@ def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
     }
 
 
-def _period_variables(
-    periods: NDArray[np.float64] | None, units: UnitSystem, omit: Collection[str], each_period: bool
+def _column_variables(
+    columns: RunColumns, units: UnitSystem, omit: Collection[str], each_period: bool
 ) -> _Variables:
-    """Return the per-period variables."""
-    if periods is None:
-        return {}
-    values = np.moveaxis(periods if each_period else of_all_periods(periods), -1, 0)
-    columns = dict(zip(PERIOD_COLUMNS, values, strict=True))
-    variables = _described({name: columns[name] for name in PERIOD_COLUMNS if name not in omit}, units)
-    if not each_period:
-        for name, (_, _, attributes) in variables.items():
-            attributes["long_name"] = OF_ALL_PERIODS[name]
+    """Return the variables of what runs recorded."""
+    variables = _described(arrays_of(columns, omit, each_period=each_period), units)
+    for name in () if each_period else OF_ALL_PERIODS.keys() & variables:
+        variables[name][2]["long_name"] = OF_ALL_PERIODS[name]
     return variables
 
 

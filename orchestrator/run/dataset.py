@@ -19,7 +19,7 @@ from vibroimpact.analysis.dataset import (
     marked,
 )
 from vibroimpact.analysis.dataset.assembling import Described, wrapped
-from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.dataset.columns import RunColumns, arrays_of
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
@@ -99,6 +99,16 @@ class DatasetForm:
         for name, attributes in self._attributes.items():
             dataset.variables[name].attrs.update(attributes)
         return marked(dataset)
+
+    @property
+    def omitted(self) -> tuple[str, ...]:
+        """Variables of each period that the scene does not record."""
+        omitted: tuple[str, ...] = self._said["omit"]
+        return omitted
+
+    def arrays(self, columns: RunColumns) -> dict[str, Any]:
+        """Return what points recorded as arrays, by their names in the dataset and in its types."""
+        return arrays_of(columns, self.omitted, each_period=self._said["each_period"])
 
     def refuse_impossible(self) -> None:
         """Raise DatasetError where no dataset of the scene can be made, whatever its points record."""

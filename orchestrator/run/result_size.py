@@ -21,7 +21,9 @@ def bytes_of_a_run(scene: Scene) -> int:
     """Return the size of what one run records, but for impacts, whose number nobody knows before."""
     record, general = scene.record, scene.general
     periods = record.recorded_periods if (record.extrema or record.strobe) and general is None else 0
-    samples = round(scene.sampling_rate * _recorded_seconds(scene))
+    # a period beyond all numbers is the body's to refuse
+    rate = scene.sampling_rate
+    samples = round(rate * _recorded_seconds(scene)) if rate else 0
     periods = periods if record.each_period else min(periods, 1)
     numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(sample_variables(scene)))
     return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))

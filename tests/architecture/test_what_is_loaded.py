@@ -144,6 +144,7 @@ NAMES = {
 CALLS: Rows = {
     "vi.run('scene.toml', progress=False)": ("", 0),
     "vi.cost_of('scene.toml')": ("", 0),
+    "vi.runner('scene.toml', 'forcing.amplitude')(1.0)": ("", 0),
     "vi.find_orbits('scene.toml', 1)": ("", 0),
     "vi.classify(vi.open_dataset('swept.nc'))": ("dask", 0),
     "vi.draw(vi.open_dataset('swept.nc'))": ("dask matplotlib", 0),

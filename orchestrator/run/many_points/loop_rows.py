@@ -66,7 +66,7 @@ def run_loop(
     carried : tuple of float or None
         Where the next point of the branch starts.
     """
-    work = _Loop(loop, points, start)
+    work = LoopArrays(loop, points, start)
     records: dict[int, RunRecord] = {}
     while (end := work.call()) is not core.RunsEnd.done:
         if end is core.RunsEnd.refused:
@@ -87,7 +87,7 @@ def run_loop(
     return joined([piece for piece in pieces if len(piece)]), work.carried
 
 
-class _Loop:
+class LoopArrays:
     """The arrays that C fills, and how far it is."""
 
     def __init__(self, loop: PointLoop, points: PreparedPoints, start: State | None) -> None:
@@ -114,6 +114,28 @@ class _Loop:
         self._blocks: list[Floats] = []
         self._give_up_at = (0, math.inf)  # a point under way, and when its time is over
         self._carry(start)
+
+    def begin_again(self) -> None:
+        """Go back to the first point, before anything has run."""
+        state = self.state
+        state.at = state.stage = state.rows_used = state.give_up = 0
+        self._blocks = []
+
+    def only_rows(self) -> Floats | None:
+        """Return the rows of a single point that came to its end on no stop; None where there is more to say of it.
+
+        They are those of the arrays: the next point is written over them.
+        """
+        arrays = self._arrays
+        if self._blocks or arrays["outcome"][0] or arrays["flags"].any():
+            return None
+        rows: Floats = arrays["rows"][: self.state.rows_used]
+        return rows
+
+    @property
+    def finals(self) -> Floats:
+        """What was read of each point at its end, shape (point, variable): `PointLoop.finals`."""
+        return self._arrays["finals"]
 
     def _carry(self, state: State | None) -> None:
         self.state.has_carried = state is not None

@@ -1,0 +1,208 @@
+"""The loop over points with one point, again and again: whoever calls it a million times pays for the motion alone.
+
+Arrays, plan and the calls of C are those of `loop_rows`, made once. Where each key is the value of one parameter of the
+FMU and nothing else, its values are put there; else the parameters of the scene are made anew for each point.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.schema import IMPACT_COLUMNS, PERIOD_COLUMNS, RULES, STICK_COLUMNS, Outcome
+from vibroimpact.fmus.core import runs as core
+from vibroimpact.orchestrator.run.dataset import DatasetForm
+from vibroimpact.orchestrator.run.many_points.loop import (
+    NOT_IN_THE_LOOP,
+    PointLoop,
+    PointValues,
+    PreparedPoints,
+)
+from vibroimpact.orchestrator.run.many_points.loop_rows import LoopArrays
+from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
+from vibroimpact.orchestrator.run.record import OBSERVED, ROW_IMPACT, ROW_PERIOD
+from vibroimpact.orchestrator.run.window import forced_window
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.models import RestitutionStop
+
+PROBES = (2.0**-20, 0.0812537291, -0.0316227766, 1.4142135e-9)
+"""Relative changes of a value, of all bits, that show what becomes of it."""
+
+
+NOT_OF_THE_MOTION = ("run_index", "direction", "point_seconds")
+"""Variables of a dataset that say nothing of the motion of a point."""
+
+Floats = NDArray[np.float64]
+_OK = np.int8(Outcome.ok)
+_PHASES = {True: np.float64(0.0), False: np.float64(np.nan)}
+_IMPACTS = [(column % len(IMPACT_COLUMNS), name) for column, name in enumerate(IMPACT_COLUMNS, start=1)]
+_CONTACT = IMPACT_COLUMNS.index("impact_contact") + 1
+_NO_STICKS = {
+    "stick_count": np.int32(0),
+    **{name: np.empty(0, dtype=RULES[name].dtype) for name in STICK_COLUMNS},
+}
+
+
+class OnePoint:
+    """Runs one point of a scene after the other, each from the scene's own start: see `one_point_of`.
+
+    Parameters
+    ----------
+    loop : PointLoop
+        Of a scene without a sweep.
+    points : PreparedPoints
+        The scene itself, one point.
+    keys : sequence of str
+    form : DatasetForm
+        What the scene says of its dataset.
+    """
+
+    def __init__(
+        self, loop: PointLoop, points: PreparedPoints, keys: Sequence[str], form: DatasetForm
+    ) -> None:
+        self._form = form
+        self._scene, self._keys, self._points = loop.scene, tuple(keys), points
+        self._names = names = loop.driver.float_names
+        self._columns = [points.columns[name] for name in names]
+        self._own = own_columns(loop.scene, keys, names)
+        self._arrays = LoopArrays(loop, points, None)
+        self._row = points.table[0]
+        record, stops = loop.scene.record, loop.scene.stops
+        self._elements = len(state_variables(loop.scene))
+        self._has_impacts = record.impacts
+        of_periods = enumerate(PERIOD_COLUMNS, start=2) if points.periods else ()
+        self._periods = [(column, name) for column, name in of_periods if name not in form.omitted]
+        self._is_plain = record.each_period and all(isinstance(stop, RestitutionStop) for stop in stops)
+        forcing = "forcing.angular_frequency", "forcing.phase"
+        self._frequency, self._phase = map(names.index, forcing) if points.forced else (-1, -1)
+
+    def run(self, values: Sequence[float]) -> dict[str, Any] | None:
+        """Run a point; None where it has to be run alone: its body refuses it, or it is of another kind.
+
+        Parameters
+        ----------
+        values : sequence of float
+            In the order of the keys.
+
+        Returns
+        -------
+        dict of str to ndarray
+            As `columns.arrays_of` names them, without the dimension of runs.
+        """
+        self._set(values)
+        if self._frequency >= 0 and not self._set_window():
+            return None
+        arrays = self._arrays
+        arrays.begin_again()
+        while (end := arrays.call()) is not core.RunsEnd.done:
+            if end is core.RunsEnd.refused:
+                return None
+        rows = arrays.only_rows() if self._is_plain else None
+        plain = None if rows is None else self._plain(rows)
+        return of_the_only_run(self._form.arrays(arrays.columns())) if plain is None else plain
+
+    def _plain(self, rows: Floats) -> dict[str, Any] | None:
+        """Return what was recorded where there are periods and impacts on rigid stops alone; None of any other rows."""
+        kinds, final = rows[:, 0], self._arrays.finals[0]
+        impacts = rows.compress(kinds == ROW_IMPACT, axis=0).T.copy()
+        periods = rows.compress(kinds == ROW_PERIOD, axis=0).T.copy()
+        if impacts.shape[1] + periods.shape[1] < len(rows):
+            return None
+        found: dict[str, Any] = {
+            "outcome": _OK,
+            "message": "",
+            "final_displacement": final[0],
+            "final_velocity": final[1],
+            "final_phase": _PHASES[self._points.forced],
+        }
+        if self._elements:
+            found["final_state"] = final[len(OBSERVED) : len(OBSERVED) + self._elements].copy()
+        for column, name in self._periods:
+            found[name] = periods[column]
+        if self._has_impacts:
+            impacts[0] = (
+                np.nan
+            )  # in the place of what tells rows apart: largest forces are those of stops that yield
+            for column, name in _IMPACTS:
+                found[name] = impacts[column]
+            found["impact_contact"] = impacts[_CONTACT].astype(np.int8)
+            found["impact_count"] = np.int32(impacts.shape[1])
+            found |= _NO_STICKS
+        return found
+
+    def _set(self, values: Sequence[float]) -> None:
+        """Give the point its parameters."""
+        row, columns = self._row, self._columns
+        if self._own is not None:
+            for place, value in zip(self._own, values, strict=True):
+                row[place] = columns[place][0] = value
+            return
+        found = float_parameters(self._scene.at(dict(zip(self._keys, values, strict=True))), None)
+        for place, name in enumerate(self._names):
+            row[place] = columns[place][0] = found[name]
+
+    def _set_window(self) -> bool:
+        """Put begin and end of the recording; False where the force has no period."""
+        frequency = float(self._row[self._frequency])
+        if frequency == 0.0:
+            return False
+        begin, end = forced_window(self._scene.record, float(self._row[self._phase]), frequency)
+        self._points.begin[0], self._points.end[0] = begin, end
+        return True
+
+
+def one_point_of(loop: PointLoop, keys: Sequence[str], form: DatasetForm) -> OnePoint | None:
+    """Return the loop over one point that varies some keys; None where points are run alone.
+
+    Parameters
+    ----------
+    loop : PointLoop
+        Of a scene without a sweep.
+    keys : sequence of str
+        Each with a value in the scene.
+    form : DatasetForm
+    """
+    points = loop.prepared(PointValues({}, np.ones(1, dtype=np.bool_)))
+    if points is None or loop.scene.execution.deadline is not None or set(keys) & set(NOT_IN_THE_LOOP):
+        return None
+    return OnePoint(loop, points, keys, form)
+
+
+def of_the_only_run(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arrays of one run without the dimension of runs, and without what says nothing of its motion."""
+    return {
+        name: array[0] if RULES[name].dims[0] == "run" else array
+        for name, array in found.items()
+        if name not in NOT_OF_THE_MOTION
+    }
+
+
+def own_columns(scene: Scene, keys: Sequence[str], names: Sequence[str]) -> list[int] | None:
+    """Return the place of the parameter that each key is; None where a key is none, or others depend on it."""
+    given = float_parameters(scene, None)
+    places = []
+    for key in keys:
+        found = {_alone(scene, key, probe, given) for probe in PROBES}
+        if len(found) > 1 or "" in found:
+            return None
+        places.append(names.index(found.pop()))
+    return places
+
+
+def _alone(scene: Scene, key: str, probe: float, given: Mapping[str, float]) -> str:
+    """Return the parameter that has another value of a key, bit for bit, and is the only one that changes; else ""."""
+    value = scene.value(key)
+    other = value * (1.0 + probe) if value else probe
+    found = float_parameters(scene.at({key: other}), None)
+    if found.keys() != given.keys():
+        return ""
+    changed = [name for name in found if _bits(found[name]) != _bits(given[name])]
+    return changed[0] if len(changed) == 1 and _bits(found[changed[0]]) == _bits(other) else ""
+
+
+def _bits(value: float) -> bytes:
+    return struct.pack("d", value)
