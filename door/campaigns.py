@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
@@ -11,9 +12,12 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_path, prepared_scene
 from vibroimpact.orchestrator.campaign import run_campaign
-from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
+from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.run.progress import Progress, shown_progress
 from vibroimpact.orchestrator.ssp import refuse_system_elsewhere
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.cluster import Client
 
 
 def campaign(
@@ -32,7 +36,8 @@ def campaign(
     folder : path
         One campaign, one folder; made when absent. The dataset is `dataset.nc` in it.
     workers : int, optional
-        Worker processes on this machine; one for each processor by default.
+        Worker processes on this machine. By default the campaign begins in this process, and one for each processor
+        goes on with it where more than 2 s are left.
     scheduler : str or dask.distributed.Client, optional
         Workers to use instead: the address of a Dask scheduler, or a client of it.
     progress : bool

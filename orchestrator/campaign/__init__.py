@@ -6,11 +6,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.campaign import CampaignInterrupted, CampaignReport, run_campaign
+    from vibroimpact.orchestrator.campaign.campaign import run_campaign
     from vibroimpact.orchestrator.campaign.check import SceneCost, cost_of
+    from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
 
 __all__ = ["CampaignInterrupted", "CampaignReport", "SceneCost", "cost_of", "run_campaign"]
-_HOMES = {"cost_of": "check", "SceneCost": "check"}
+_HOMES = {
+    "cost_of": "check",
+    "SceneCost": "check",
+    "CampaignInterrupted": "report",
+    "CampaignReport": "report",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -11,22 +11,19 @@ from __future__ import annotations
 
 import os
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, ChunkResult, Work, get_ready
-from vibroimpact.orchestrator.campaign.cluster import Client, open_workers
-from vibroimpact.orchestrator.campaign.computation import Computation
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, ChunkResult, Work, get_ready
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
     Kept,
@@ -37,6 +34,7 @@ from vibroimpact.orchestrator.campaign.extension import (
     read_kept,
     scene_of_manifest,
 )
+from vibroimpact.orchestrator.campaign.here import computed_here, may_begin_here, opened_here
 from vibroimpact.orchestrator.campaign.manifest import (
     DamagedManifestError,
     Manifest,
@@ -65,7 +63,7 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
-from vibroimpact.orchestrator.campaign.pool import WorkerPool
+from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
 from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
@@ -75,50 +73,22 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 from vibroimpact.orchestrator.scene.sweep import run_count
 
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.cluster import Client
+    from vibroimpact.orchestrator.campaign.pool import WorkerPool
+
 MOST_ROUNDS = 3
 """How often parts that turn out unfit are computed again by one command."""
 MOST_NAMED = 5
 
-OpenedWorkers = Callable[[], AbstractContextManager[WorkerPool]]
+OpenedWorkers = Callable[[], AbstractContextManager["WorkerPool"]]
 
 
-class CampaignInterrupted(KeyboardInterrupt):
-    """Ctrl-C ended a campaign in good order; its text says what is there and how to go on."""
+def open_workers(**options: Any) -> AbstractContextManager[WorkerPool]:
+    """Open workers, see `cluster.open_workers`: loaded by those who need any, since Dask takes half a second."""
+    from vibroimpact.orchestrator.campaign import cluster
 
-
-@dataclass(slots=True)
-class CampaignReport:
-    """What a campaign did.
-
-    Attributes
-    ----------
-    dataset : Path
-    runs : int
-        Runs in the dataset.
-    resumed : int
-        Runs that were there already; equal to `runs` when there was nothing to do.
-    outcomes : Counter
-        How the runs computed now ended.
-    chunks : list of Chunk
-        In the order in which they ended.
-    workers : int
-    lost_workers : int
-        How many died before the last point was done.
-    compute_seconds : float
-        From the first chunk handed out to the last one done; workers were ready before, s.
-    compaction_seconds : float
-        Making one dataset of the parts, s.
-    """
-
-    dataset: Path
-    runs: int
-    resumed: int = 0
-    outcomes: Counter[str] = field(default_factory=Counter)
-    chunks: list[Chunk] = field(default_factory=list)
-    workers: int = 0
-    lost_workers: int = 0
-    compute_seconds: float = 0.0
-    compaction_seconds: float = 0.0
+    return cluster.open_workers(**options)
 
 
 def run_campaign(
@@ -138,7 +108,8 @@ def run_campaign(
     folder : path
         One campaign, one folder; made when absent.
     workers : int, optional
-        Worker processes on this machine; one for each processor by default.
+        Worker processes on this machine. By default the campaign begins in this process, and one for each processor
+        goes on with it where more than 2 s are left.
     scheduler : str or dask.distributed.Client, optional
         Address of a Dask scheduler, or a client of one, to use instead.
     runner : str
@@ -160,7 +131,8 @@ def run_campaign(
     with locked_folder(home):
         opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
         try:
-            campaign = _Campaign(scene, home, runner, progress or Progress())
+            here = workers is None and scheduler is None
+            campaign = _Campaign(scene, home, runner, progress or Progress(), here=here)
             return campaign.finished_before() or campaign.run(opened)
         except OSError as error:
             # Of this process or of a worker: the folder for temporary files may be full too.
@@ -174,7 +146,9 @@ def run_campaign(
 class _Campaign:
     """One campaign in its folder, which this process holds."""
 
-    def __init__(self, scene: Scene, home: Path, runner: str, progress: Progress) -> None:
+    def __init__(
+        self, scene: Scene, home: Path, runner: str, progress: Progress, *, here: bool = False
+    ) -> None:
         self._scene = scene
         self._home = home
         self._progress = progress
@@ -188,6 +162,7 @@ class _Campaign:
         hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
         self._kept_path = kept_path(self._parts_folder, hashed)
         self._rounds: Rounds | None = None
+        self._begins_here = here and may_begin_here(scene, runner, self._report.runs)
         self._work = Work(
             scene.model_copy(update={"source": source}),
             str(self._parts_folder),
@@ -356,32 +331,74 @@ class _Campaign:
 
     def _compute_on(self, stages: Iterable[Stage], stored: Sequence[Path], workers: OpenedWorkers) -> None:
         try:
+            left = self._computed_here(iter(stages)) if self._begins_here else iter(stages)
+            stage = next(left, None)
+            if stage is None:
+                return
             with workers() as pool:
                 if not pool.is_local:
                     refuse_blind_workers(pool, self._home)
                 work = replace(self._work, identity=_common_identity(pool, self._work))
                 self._agree_with_manifest(pool, work, stored)
-                carried = carried_manifest(read_content(self._manifest_path), work.scene.source)
-                self._compute_with(pool, replace(work, manifest=carried), stages)
+                self._compute_with(pool, self._with_manifest(work), chain([stage], left))
         finally:
             # A worker that was stopped may have been writing.
             remove_temporary_files(self._parts_folder)
 
+    def _with_manifest(self, work: Work) -> Work:
+        """Return the work with what each part says of its campaign."""
+        return replace(work, manifest=carried_manifest(read_content(self._manifest_path), work.scene.source))
+
+    def _computed_here(self, stages: Iterator[Stage]) -> Iterator[Stage]:
+        """Compute in this process what is quickly done; return what is left for workers."""
+        with opened_here(self._work) as identity:
+            if identity is None or (self._manifest and runner_differences(self._manifest, identity)):
+                return stages  # what differs from what began is the workers' to compare
+            if self._manifest is None:
+                write_manifest(self._manifest_path, self._scene, identity, self._report.runs)
+                self._manifest = read_manifest(self._manifest_path)
+            work = self._with_manifest(replace(self._work, identity=identity))
+            with self._computing():
+                for stage in stages:
+                    left = computed_here(
+                        self._of_stage(work, stage), stage, self._schedule(work, stage, 1), self._take
+                    )
+                    if left is not None:
+                        return chain([left], stages)
+        return iter(())
+
     def _compute_with(self, pool: WorkerPool, work: Work, stages: Iterable[Stage]) -> None:
+        # loaded by those who need workers
+        from vibroimpact.orchestrator.campaign.computation import Computation
+
         self._report.workers = len(pool.worker_addresses())
-        began = time.perf_counter()
         try:
-            for stage in stages:
-                in_lanes = work.identity is not None and work.identity.execution == "lanes"
-                schedule = ChunkSchedule(stage.branches, stage.held, self._report.workers, in_lanes=in_lanes)
-                self._report.runs = stage.runs
-                self._progress.begin(stage.runs, stage.runs - schedule.left, stage.said)
-                own = replace(work, branches=stage.branches) if self._rounds is not None else work
-                Computation(pool, own, schedule, self._take).run()
+            with self._computing():
+                for stage in stages:
+                    schedule = self._schedule(work, stage, self._report.workers)
+                    Computation(pool, self._of_stage(work, stage), schedule, self._take).run()
         finally:
-            self._report.compute_seconds += time.perf_counter() - began
             self._report.lost_workers += pool.lost_workers
             pool.cancel_all()
+
+    def _schedule(self, work: Work, stage: Stage, workers: int) -> ChunkSchedule:
+        """Return the schedule of a stage, which begins now."""
+        in_lanes = work.identity is not None and work.identity.execution == "lanes"
+        schedule = ChunkSchedule(stage.branches, stage.held, workers, in_lanes=in_lanes)
+        self._report.runs = stage.runs
+        self._progress.begin(stage.runs, stage.runs - schedule.left, stage.said)
+        return schedule
+
+    def _of_stage(self, work: Work, stage: Stage) -> Work:
+        return replace(work, branches=stage.branches) if self._rounds is not None else work
+
+    @contextmanager
+    def _computing(self) -> Iterator[None]:
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._report.compute_seconds += time.perf_counter() - began
 
     def _agree_with_manifest(self, pool: WorkerPool, work: Work, stored: Sequence[Path]) -> None:
         """Let a new campaign note what runs it, and an old one refuse what would give it other results."""

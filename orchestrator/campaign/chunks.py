@@ -125,19 +125,38 @@ class ChunkResult:
     compute_seconds: float
 
 
+_runners: list[Runner] = []
+"""The runner that this process has opened for chunks, to be closed where the process lives on."""
+
+
 @lru_cache(maxsize=1)
 def _opened(scene: Scene, runner: str, execution: str) -> tuple[tuple[Branch, ...], Runner]:
     """Return the branches of a scene, and what runs their points in this process."""
-    return expand(scene), named_runner(scene, runner, execution or None)
+    opened = named_runner(scene, runner, execution or None)
+    _runners[:] = [opened]
+    return expand(scene), opened
+
+
+def runner_identity(work: Work) -> RunnerIdentity:
+    """Open the scene in this process, where it stays open, and return which runner it has."""
+    return _opened(work.scene, work.runner, work.execution)[1].identity
+
+
+def close_opened() -> None:
+    """Close what this process has opened for chunks."""
+    if _runners:
+        _runners.pop().close()
+    _opened.cache_clear()
+    _kept_runs.cache_clear()
 
 
 def get_ready(work: Work) -> RunnerIdentity:
     """Load all that a worker needs before its first chunk, and return which runner it has."""
-    _, runner = _opened(work.scene, work.runner, work.execution)
+    identity = runner_identity(work)
     # The first dataset of a process takes long, because libraries load what they need when they need it.
     with ScratchFolder("rehearsal") as folder:
         write_dataset(empty_dataset(work.scene), Path(folder.name, "rehearsal.nc"))
-    return runner.identity
+    return identity
 
 
 def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:

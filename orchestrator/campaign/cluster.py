@@ -132,15 +132,6 @@ def open_workers(
         yield pool
 
 
-def refuse_two_kinds_of_workers(workers: int | None, scheduler: object) -> None:
-    """Refuse workers of this machine beside those of a scheduler."""
-    if workers is not None and scheduler is not None:
-        raise UsageError(
-            f"{option('workers')} and {option('scheduler')}: expected one of them, got both. "
-            "A scheduler has its own workers."
-        )
-
-
 def _reached_by(scheduler: str | Client) -> tuple[str, Security | None]:
     """Return the address of a scheduler, and the certificates of the client that knows it."""
     if isinstance(scheduler, str):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -19,10 +19,12 @@ from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, compute_again
 from vibroimpact.orchestrator.campaign.extension import final_states, without_empty_periods
-from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.pool import WorkerPool
 
 MOST_POINTS = 8
 """Points that are computed again."""

@@ -101,6 +101,11 @@ class ChunkSchedule:
         """How many chunks are worth handing out at a time."""
         return QUEUED_PER_WORKER * self._workers
 
+    @property
+    def seconds_left(self) -> float:
+        """Return how long the runs that are not handed out take at the pace so far, s; 0 before it is known."""
+        return self.left * (self._pace or 0.0)
+
     def next_chunk(self) -> Chunk | None:
         """Hand out a chunk; None when nothing can be computed before another chunk has ended."""
         if self._units and len(self._begun) < self.most_in_flight:

@@ -9,7 +9,7 @@ import typer
 from vibroimpact.analysis.dataset.outputs import refuse_folder
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_workers
+from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
 from vibroimpact.orchestrator.commands.preparing import prepared
 from vibroimpact.orchestrator.operations.campaign import Campaign
@@ -34,9 +34,10 @@ def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | No
         say(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
         return
     kept = f", {report.resumed} were there" if report.resumed else ""
+    by = f"by {counted(report.workers, 'worker')}" if report.workers else "in this process"
     say(
-        f"{counted(report.runs - report.resumed, 'point')} computed in {report.compute_seconds:.1f} s by "
-        f"{counted(report.workers, 'worker')}{kept}: {report.dataset}"
+        f"{counted(report.runs - report.resumed, 'point')} computed in {report.compute_seconds:.1f} s "
+        f"{by}{kept}: {report.dataset}"
     )
     if report.lost_workers:
         lost = "was lost; what it" if report.lost_workers == 1 else "were lost; what they"

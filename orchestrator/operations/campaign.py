@@ -27,7 +27,10 @@ class Campaign(Operation):
     ]
     changes: Changes = None
     workers: Annotated[
-        int | None, Option(help="Worker processes; one for each processor by default.", min=1)
+        int | None,
+        Option(
+            help="Worker processes; by default one for each processor, where more than 2 s are left.", min=1
+        ),
     ] = None
     scheduler: Annotated[
         str | None,

@@ -65,6 +65,33 @@ class _Limit:
 
 _UNLIMITED = _Limit()
 _LIMIT: ContextVar[_Limit] = ContextVar("limit of runs")
+_ABANDONED: ContextVar[float] = ContextVar("time at which runs are abandoned", default=math.inf)
+
+
+class RunsAbandonedError(Exception):
+    """Runs took longer than whoever asked for them wants to wait; nothing of them counts."""
+
+
+@contextmanager
+def runs_abandoned(time_of_it: float) -> Iterator[None]:
+    """Abandon the runs of this thread that are under way at a time, s of `time.perf_counter`.
+
+    Raises
+    ------
+    RunsAbandonedError
+        In whatever runs then.
+    """
+    before = _ABANDONED.set(time_of_it)
+    try:
+        yield
+    finally:
+        _ABANDONED.reset(before)
+
+
+def refuse_abandoned() -> None:
+    """Raise RunsAbandonedError where the runs of this thread are abandoned."""
+    if time.perf_counter() > _ABANDONED.get():
+        raise RunsAbandonedError
 
 
 @contextmanager
@@ -103,6 +130,7 @@ class Deadline:
     @property
     def is_over(self) -> bool:
         """Whether the time is over."""
+        refuse_abandoned()
         return self._now() > self._end
 
     def refuse_late(self) -> None:

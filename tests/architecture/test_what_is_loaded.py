@@ -114,6 +114,7 @@ OTHERS: Rows = {
     # xarray asks which scheduler of Dask there is when it writes
     "maps --kind square-root --points 20 --from 0.1 --to 0.2 -o map.nc": (f"{ASKED} distributed", 0),
     "plot swept.nc -o swept.png": ("dask matplotlib", 0),
+    "campaign swept.toml -o few": ("", 0),
     # no workers answer there: what is loaded is what a client needs
     "campaign swept.toml -o campaign --scheduler tcp://127.0.0.1:1": ("dask distributed", 2),
     "demo -o scene.toml": ("dask distributed matplotlib", 2),
@@ -134,7 +135,6 @@ OTHERS: Rows = {
 }
 """All other commands, with what they may load of `HEAVY`, and their exit code."""
 NAMES = {
-    "campaign": "dask distributed",
     "figures": "matplotlib",
     "draw": "matplotlib",
     **dict.fromkeys(("export_fmu", "export_ssp", "import_ssp"), "fmpy"),

@@ -193,6 +193,32 @@ def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identical
     assert_same_rows(folder / "dataset.nc", expected)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL], ids=["ctrl-c", "kill -9"])
+@up_and_down
+def test_a_campaign_without_workers_that_is_ended_is_resumed_by_workers_and_the_other_way_round(
+    uninterrupted: tuple[Path, Path], tmp_path: Path, number: signal.Signals
+) -> None:
+    scene, expected = uninterrupted
+    first = CampaignProcess(scene, tmp_path / "campaign", runner="BusyRunner@here")
+    first.wait_for_parts(3)
+    assert first.workers() == []
+    os.kill(first.process.pid, number)
+    code, _, err = first.end()
+    first.assert_nothing_lives()
+    assert code == (130 if number == signal.SIGINT else -number)
+    if number == signal.SIGINT:
+        assert f"of {POINTS} points are complete" in err
+    second = CampaignProcess(scene, tmp_path / "campaign", *TWO)
+    second.wait_for_parts(len(first.parts()) + 2)
+    os.killpg(second.process.pid, number)
+    second.end()
+    second.assert_nothing_lives()
+    code, out, err = run_campaign_process(scene, tmp_path / "campaign", runner="BusyRunner@here")
+    assert code == 0, err
+    assert "in this process, " in out  # others were there
+    assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
+
+
 @up_and_down
 def test_damaged_parts_are_noticed_and_computed_again(
     uninterrupted: tuple[Path, Path], killed: Path, cluster: str, tmp_path: Path

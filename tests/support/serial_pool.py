@@ -84,4 +84,4 @@ def campaign_here(
 
     with patch.context() as patched:
         patched.setattr(campaign, "open_workers", here)
-        return run_campaign(parse_scene(text, "test.toml"), folder, runner=runner, progress=notes)
+        return run_campaign(parse_scene(text, "test.toml"), folder, workers=1, runner=runner, progress=notes)

@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.run.many_points.loop_rows import (
 )
 from vibroimpact.orchestrator.run.parameters import oscillator_start
 from vibroimpact.orchestrator.run.points import State
-from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH, impact_rows
+from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH, impact_rows, refuse_abandoned
 from vibroimpact.orchestrator.run.runner import CARRYING, next_start
 from vibroimpact.orchestrator.run.window import limit_message
 from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
@@ -184,6 +184,7 @@ class _LaneRun:
 
     def _call(self) -> core.LanesEnd:
         """Let C go on; signals are heard between two calls."""
+        refuse_abandoned()
         began = time.perf_counter()
         end = core.run_lanes(self._plan, self._c, self._memory)
         self._seconds += time.perf_counter() - began

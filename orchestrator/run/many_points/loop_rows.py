@@ -27,6 +27,7 @@ from vibroimpact.orchestrator.run.record import (
     impact_rows,
     in_time_order,
     open_contacts,
+    refuse_abandoned,
 )
 from vibroimpact.orchestrator.run.window import TWO_PI, late_message, limit_message, no_load_message
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
@@ -151,6 +152,7 @@ class LoopArrays:
 
     def call(self) -> core.RunsEnd:
         """Let C go on; signals are heard between two calls."""
+        refuse_abandoned()
         self._watch_deadline()
         end = core.run_points(self._loop.fmu, self._plan, self.state)
         if end is core.RunsEnd.full:

@@ -1,0 +1,101 @@
+"""The beginning of a campaign, in this process: one of few points needs no workers, which take seconds to start.
+
+Chunks, parts and bits are those of workers. As soon as the pace of what is done says that more than `HERE_SECONDS` are
+left, or a chunk takes that long, workers go on with the rest.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from vibroimpact.orchestrator.campaign.chunks import (
+    DEFAULT_RUNNER,
+    ChunkResult,
+    Work,
+    close_opened,
+    run_chunk,
+    runner_identity,
+)
+from vibroimpact.orchestrator.campaign.parts import StoredPart
+from vibroimpact.orchestrator.campaign.rounds import Stage
+from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.record import RunsAbandonedError, runs_abandoned
+from vibroimpact.orchestrator.scene import Scene
+
+HERE_SECONDS = 2.0
+"""Work left, or in one chunk, above which workers take over, s: about what their start takes."""
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Held by the campaign that computes in this process; one of another thread starts workers."""
+
+
+def may_begin_here(scene: Scene, runner: str, points: int) -> bool:
+    """Return whether a campaign may begin in this process, with nothing that takes it down or holds it up.
+
+    Bodies of ours do neither. Where a guard watches over strangers, waiting for it is worth it for one point alone.
+    """
+    if runner != DEFAULT_RUNNER:
+        return False
+    return points == 1 if scene.is_guarded else scene.general is None
+
+
+@contextmanager
+def opened_here(work: Work) -> Iterator[RunnerIdentity | None]:
+    """Open a scene in this process for a while; None where another campaign of this process computes in it."""
+    if not _ONE_AT_A_TIME.acquire(blocking=False):
+        yield None
+        return
+    try:
+        yield runner_identity(work)
+    finally:
+        close_opened()
+        _ONE_AT_A_TIME.release()
+
+
+def computed_here(
+    work: Work, stage: Stage, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
+) -> Stage | None:
+    """Compute a stage until it is complete, or more is left of it than is worth doing here.
+
+    Parameters
+    ----------
+    work : Work
+        Opened in this process: see `opened_here`.
+    stage : Stage
+    schedule : ChunkSchedule
+        Of the stage, for one worker.
+    done : callable
+        Told of each chunk whose part is on the disk.
+
+    Returns
+    -------
+    Stage or None
+        What is left for workers: the stage with the parts of this process; None where nothing is.
+    """
+    results: list[ChunkResult] = []
+    while (chunk := schedule.next_chunk()) is not None:
+        try:
+            with runs_abandoned(time.perf_counter() + HERE_SECONDS):
+                result = run_chunk(work, chunk)
+        except RunsAbandonedError:
+            return _with_parts(stage, results, Path(work.parts_folder))
+        schedule.finished(chunk, result)
+        results.append(result)
+        done(result)
+        if schedule.seconds_left > HERE_SECONDS:
+            return _with_parts(stage, results, Path(work.parts_folder))
+    return None
+
+
+def _with_parts(stage: Stage, results: Iterable[ChunkResult], folder: Path) -> Stage:
+    """Return a stage of which more is computed."""
+    parts = [
+        StoredPart(folder / one.chunk.part_name, one.chunk, one.carried, one.chunk.count) for one in results
+    ]
+    return replace(stage, held=sorted([*stage.held, *parts], key=lambda part: part.chunk.first))
