@@ -20,7 +20,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from vibroimpact.fmus.confinement import PATIENCE
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.python_child import python_command
 from vibroimpact.fmus.reader_child import send
 from vibroimpact.fmus.reader_fork import read_in_fork
 from vibroimpact.fmus.reader_orders import Answer, Order, received

@@ -10,7 +10,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.fmus.processes.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.problems import ProblemError
 

@@ -15,7 +15,7 @@ from typing import Any
 from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import is_device
-from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.fmus.processes.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.store import OUTPUTS, Store
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.fmus.processes.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.job_process import INTERRUPTED, LATER, Work
 from vibroimpact.service.problems import is_full, is_held, is_short, why_later

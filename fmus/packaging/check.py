@@ -18,7 +18,7 @@ from vibroimpact.fmus.packaging.archive import INTERFACES, UnpackedFmu, binary_p
 from vibroimpact.fmus.packaging.fmpy_door import reading_of, schema_folder
 from vibroimpact.fmus.packaging.model_description import Finding, Grade, build_problems
 from vibroimpact.fmus.packaging.platform_names import FMI2_SYSTEMS, SUFFIXES
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.python_child import python_command
 from vibroimpact.fmus.safe_xml import root_of
 
 #: Longest time that loading and instantiating an FMU may take, s.

@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging.platform_names import Platform, library_suffix, system
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.python_child import python_command
 
 #: Chosen by the user; if it does not work that is an error, not a reason to take another.
 CHOICE = "VIBROIMPACT_CC"

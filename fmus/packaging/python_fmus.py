@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.description import UnitDefinition, unit_definitions
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.python_child import python_command
 from vibroimpact.fmus.units import Unit
 
 SOURCES = Path(__file__).parents[1] / "python"

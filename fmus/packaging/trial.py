@@ -22,7 +22,7 @@ from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.packaging.description import ComponentDescription, Experiment, literal
 from vibroimpact.fmus.packaging.platform_names import library_suffix
 from vibroimpact.fmus.packaging.trial_run import INSTANCE
-from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.fmus.processes.python_child import ending, python_command
 
 #: Where the files of the layered standard are.
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 
 from vibroimpact.fmus.errors import RigError
-from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.fmus.processes.python_child import ending, python_command
 
 MODULE = "vibroimpact.hardware.rig.guardian"
 READY_SECONDS = 30.0

@@ -25,7 +25,7 @@ from distributed.utils import get_mp_context
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
-from vibroimpact.fmus.python_child import no_library_warns, safe_module_path
+from vibroimpact.fmus.processes.python_child import no_library_warns, safe_module_path
 from vibroimpact.fmus.surroundings import (
     LOOPBACK,
     leave_removed_folder,

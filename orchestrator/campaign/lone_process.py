@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.fmus.python_child import ending, no_library_warns, safe_module_path
+from vibroimpact.fmus.processes.python_child import ending, no_library_warns, safe_module_path
 from vibroimpact.fmus.surroundings import leave_removed_folder
 
 POLL_SECONDS = 0.5

@@ -10,9 +10,10 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError, VibroimpactError
+from vibroimpact.fmus.processes.child import private_pipes
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.guard.pipe import (
     BATCH_TIME,
@@ -90,19 +91,6 @@ class _Answers:
         self._unread = 0
 
 
-def _private_pipes() -> tuple[BinaryIO, int]:
-    """Keep standard input and output for orders and answers; what an FMU prints goes to standard error.
-
-    Neither an FMU nor a program that it starts can read an order or hold the answers open.
-    """
-    orders, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    os.dup2(2, 1)
-    return orders, answers
-
-
 def _answer(runner: Runner, point: PointTask) -> Any:
     try:
         return runner.run(*point)
@@ -132,8 +120,8 @@ def main(bell: int | None) -> None:
     # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = os.getppid()
-    orders, pipe = _private_pipes()
-    answers = _Answers(pipe, bell)
+    given, pipe = private_pipes()
+    orders, answers = os.fdopen(given, "rb"), _Answers(pipe, bell)
     order = receive(orders)
     if not isinstance(order, Order):
         return

@@ -24,7 +24,7 @@ from typing import Any
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
-from vibroimpact.fmus.python_child import ending
+from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.guard.pipe import BATCH_TIME, MOST_POINTS, Failure, Order, PointTask
 from vibroimpact.orchestrator.guard.point_process import HAS_BELL, PointProcess

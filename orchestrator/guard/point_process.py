@@ -6,14 +6,13 @@ import contextlib
 import os
 import queue
 import select
-import subprocess
 import sys
 import threading
 from dataclasses import replace
 from functools import partial
 from typing import IO, Any
 
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.process import Process
 from vibroimpact.orchestrator.guard.pipe import BELL, Order, receive, send
 
 #: A process that can wait for a bell runs points in batches; elsewhere a thread reads the answers one by one.
@@ -40,15 +39,7 @@ class PointProcess:
         self._bell, bell = os.pipe() if HAS_BELL else (-1, -1)
         self._memory = os.memfd_create("records") if sys.platform == "linux" else None
         passed = [each for each in (bell, self._memory) if each is not None] if HAS_BELL else []
-        self._process = subprocess.Popen(
-            python_command("-m", "vibroimpact.orchestrator.guard.supervisor", str(bell)),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C reaches all processes of a terminal's session: it is the parent's
-            pass_fds=passed,
-        )
-        assert self._process.stdout is not None
+        self._process = Process("-m", "vibroimpact.orchestrator.guard.supervisor", str(bell), passed=passed)
         _enlarge(self._process.stdout)
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._reader: threading.Thread | None = None
@@ -62,18 +53,14 @@ class PointProcess:
         self.say(replace(order, memory=self._memory))
 
     def _read(self) -> None:
-        assert self._process.stdout is not None
         while (answer := receive(self._process.stdout)) is not None:
             self._answers.put(answer)
         self._answers.put(None)
 
     def say(self, message: Any) -> None:
         """Send a message; a child that is gone shows in its answer."""
-        assert self._process.stdin is not None
-        try:
+        with contextlib.suppress(BrokenPipeError):
             send(self._process.stdin, message)
-        except BrokenPipeError:
-            return  # its output has ended too, which `answers` sees
 
     def answers(self, seconds: float) -> tuple[list[Any], bool]:
         """Wait until there is something to read; return the answers, and whether no more of them come.
@@ -96,7 +83,6 @@ class PointProcess:
         if len(rung) < BELL.size:
             return [None], True
         count, last = BELL.unpack(rung)
-        assert self._process.stdout is not None
         answers = [receive(self._process.stdout, self._memory) for _ in range(count)]
         return answers, last or answers[-1] is None
 
@@ -110,16 +96,11 @@ class PointProcess:
         answers : list
             What it had answered and nobody has read.
         """
-        self._close(self._process.stdin)
         if at_once:
             self._process.terminate()
-        try:
-            code = self._process.wait(END_TIME)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            code = self._process.wait()
+        code = self._process.end(END_TIME)
         answers = self._unread()
-        self._close(self._process.stdout)
+        self._process.stdout.close()
         if self._memory is not None:
             os.close(self._memory)
         return code, answers
@@ -130,15 +111,6 @@ class PointProcess:
             return []
         os.close(self._bell)
         pipe = self._process.stdout
-        assert pipe is not None
         # a process that an FMU has started may hold the pipe open
         os.set_blocking(pipe.fileno(), False)
         return list(iter(partial(receive, pipe, self._memory), None))
-
-    @staticmethod
-    def _close(pipe: IO[bytes] | None) -> None:
-        assert pipe is not None
-        try:
-            pipe.close()
-        except BrokenPipeError:
-            return  # what was still to be sent has no reader any more

@@ -20,7 +20,7 @@ import pytest
 from harness import kept_costs, warm
 from harness._shares import Shares
 from harness._worker import run_share
-from vibroimpact.fmus.python_child import ending
+from vibroimpact.fmus.processes.python_child import ending
 
 FORKS = sys.platform == "linux"
 """Elsewhere libraries of the system do not survive a fork, or there is none."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vibroimpact.analysis import figures, open_dataset
 from vibroimpact.analysis.dataset.outputs import writing
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.python_child import python_command
 
 FILE = "live.png"
 SECONDS = 5.0

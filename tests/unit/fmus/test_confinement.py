@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vibroimpact.fmus.confinement import forbid_writing_and_network
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.processes.python_child import python_command
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="nothing is limited there")
 
