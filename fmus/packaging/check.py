@@ -6,8 +6,6 @@ described token opens it.
 
 from __future__ import annotations
 
-import json
-import subprocess
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +16,7 @@ from vibroimpact.fmus.packaging.archive import INTERFACES, UnpackedFmu, binary_p
 from vibroimpact.fmus.packaging.fmpy_door import reading_of, schema_folder
 from vibroimpact.fmus.packaging.model_description import Finding, Grade, build_problems
 from vibroimpact.fmus.packaging.platform_names import FMI2_SYSTEMS, SUFFIXES
-from vibroimpact.fmus.processes.python_child import python_command
+from vibroimpact.fmus.processes.call import call
 from vibroimpact.fmus.safe_xml import root_of
 
 #: Longest time that loading and instantiating an FMU may take, s.
@@ -127,16 +125,13 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
         # PythonFMU's binary is the same for all its FMUs, and looks at no token
         "any_token": root.get("generationTool", "").startswith("PythonFMU"),
     }
-    command = python_command("-m", "vibroimpact.fmus.packaging.load_check", json.dumps(facts))
-    try:
-        result = subprocess.run(command, capture_output=True, text=True, timeout=LOADING_LIMIT)
-    except subprocess.TimeoutExpired:
+    done = call("vibroimpact.fmus.packaging.load_check:problems_of", facts, seconds=LOADING_LIMIT)
+    if done.is_late:
         text = f"expected to load and instantiate within {LOADING_LIMIT:g} s, got no answer."
         return (Finding(Grade.refused, f"{binary.name}: {text}"),)
-    if result.returncode != 0:
-        last = result.stderr.strip().splitlines()[-1:] or ["no message"]
-        text = f"expected to load and instantiate, got exit code {result.returncode}: {last[0]}"
+    if done.answer is None or done.code != 0:
+        text = (
+            f"expected to load and instantiate, got exit code {done.code}: {done.last_line or 'no message'}"
+        )
         return (Finding(Grade.refused, f"{binary.name}: {text}"),)
-    # the FMU may print too: the answer is the last line
-    answer = json.loads(result.stdout.splitlines()[-1])
-    return tuple(Finding(Grade[grade], text) for grade, text in answer)
+    return tuple(Finding(Grade[grade], text) for grade, text in done.answer)

@@ -1,13 +1,11 @@
 """Loads the binary of an FMU and reports what is wrong with it.
 
-Run as `python -m vibroimpact.fmus.packaging.load_check FACTS`, in a process of its own, since the code of a broken FMU
-may do anything. FACTS is a JSON object; the last line printed is a JSON list of pairs: the name of a grade, and a line.
+It is called in a process of its own, since the code of a broken FMU may do anything.
 """
 
 from __future__ import annotations
 
 import ctypes
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -53,8 +51,8 @@ class Fmi2Callbacks(Structure):
     )
 
 
-def problems_of(facts: dict[str, Any]) -> Iterator[Found]:
-    """Yield what is wrong with a binary: the name of a grade, and a line.
+def problems_of(facts: dict[str, Any]) -> list[Found]:
+    """Return what is wrong with a binary: the name of a grade, and a line.
 
     Parameters
     ----------
@@ -66,10 +64,12 @@ def problems_of(facts: dict[str, Any]) -> Iterator[Found]:
     try:
         library = CDLL(facts["binary"])
     except OSError as error:
-        yield REFUSED, f"{name}: expected a library that loads, got: {error}."
-        return
-    for interface in facts["interfaces"]:
-        yield from _problems_of_interface(library, {**facts, "interface": interface})
+        return [(REFUSED, f"{name}: expected a library that loads, got: {error}.")]
+    return [
+        found
+        for interface in facts["interfaces"]
+        for found in _problems_of_interface(library, {**facts, "interface": interface})
+    ]
 
 
 def _problems_of_interface(library: CDLL, facts: dict[str, Any]) -> Iterator[Found]:
@@ -150,9 +150,3 @@ def _instantiate2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
 
 
 _kept: list[Fmi2Callbacks] = []
-
-
-if __name__ == "__main__":
-    found = list(problems_of(json.loads(sys.argv[1])))
-    print()
-    print(json.dumps(found))

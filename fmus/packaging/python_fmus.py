@@ -11,7 +11,6 @@ import hashlib
 import importlib.util
 import json
 import shutil
-import subprocess
 import tempfile
 import uuid
 import zipfile
@@ -24,7 +23,7 @@ from xml.etree import ElementTree
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.description import UnitDefinition, unit_definitions
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
-from vibroimpact.fmus.processes.python_child import python_command
+from vibroimpact.fmus.processes.call import call
 from vibroimpact.fmus.units import Unit
 
 SOURCES = Path(__file__).parents[1] / "python"
@@ -184,24 +183,18 @@ def _copy(source: Path, target: Path) -> None:
 
 def _built(parts: PythonFmu) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as output:
-        command = python_command("-m", "pythonfmu", "build", "-f", str(parts.script), "-d", output)
-        _run([*command, *(str(extra) for extra in parts.extras)], parts)
+        _build("-f", str(parts.script), "-d", output, *map(str, parts.extras), parts=parts)
         (path,) = Path(output).glob("*.fmu")
         with zipfile.ZipFile(path) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
 
 
-def _run(command: list[str], parts: PythonFmu) -> None:
-    try:
-        result = subprocess.run(
-            command, capture_output=True, text=True, timeout=BUILD_LIMIT, cwd=parts.script.parent
-        )
-    except subprocess.TimeoutExpired as error:
-        raise ComponentFileError(
-            f"{parts.blamed}: expected to run within {BUILD_LIMIT:g} s, got no answer."
-        ) from error
-    if result.returncode != 0:
-        raise ComponentFileError(f"{parts.blamed}: {_last_message(result.stderr)}")
+def _build(*words: str, parts: PythonFmu) -> None:
+    done = call("pythonfmu", "build", *words, seconds=BUILD_LIMIT, folder=parts.script.parent)
+    if done.is_late:
+        raise ComponentFileError(f"{parts.blamed}: expected to run within {BUILD_LIMIT:g} s, got no answer.")
+    if done.code != 0:
+        raise ComponentFileError(f"{parts.blamed}: {_last_message(done.said)}")
 
 
 def _last_message(errors: str) -> str:

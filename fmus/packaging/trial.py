@@ -9,8 +9,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import json
-import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +20,8 @@ from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.packaging.description import ComponentDescription, Experiment, literal
 from vibroimpact.fmus.packaging.platform_names import library_suffix
 from vibroimpact.fmus.packaging.trial_run import INSTANCE
-from vibroimpact.fmus.processes.python_child import ending, python_command
+from vibroimpact.fmus.processes.call import call
+from vibroimpact.fmus.processes.python_child import ending
 
 #: Where the files of the layered standard are.
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -115,17 +114,14 @@ def _said(message: str) -> str:
 
 
 def _answer(name: str, facts: Mapping[str, object]) -> dict[str, Any]:
-    command = python_command("-m", "vibroimpact.fmus.packaging.trial_run", json.dumps(facts))
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
-    except subprocess.TimeoutExpired as error:
-        raise ComponentError(f"{name}: expected a run within {LIMIT:g} s, got no answer.") from error
-    if done.returncode != 0:
-        last = done.stderr.strip().splitlines()[-1:] or ["no message"]
+    done = call("vibroimpact.fmus.packaging.trial_run:trial", facts, seconds=LIMIT)
+    if done.is_late:
+        raise ComponentError(f"{name}: expected a run within {LIMIT:g} s, got no answer.")
+    if done.answer is None or done.code != 0:
         raise ComponentError(
-            f"{name}: expected a run of its library, which {ending(done.returncode)}: {last[0]}"
+            f"{name}: expected a run of its library, which {ending(done.code)}: {done.last_line or 'no message'}"
         )
-    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    answer: dict[str, Any] = done.answer
     return answer
 
 

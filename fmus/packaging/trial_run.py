@@ -1,14 +1,11 @@
 """Runs the library of a component once, as an export describes it, and reports what it gave.
 
-Run as `python -m vibroimpact.fmus.packaging.trial_run FACTS`, in a process of its own: a library that ends its process
-ends no other. FACTS is a JSON object; the last line printed is a JSON object, the `Trial`.
+It is called in a process of its own: a library that ends its process ends no other.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from ctypes import CDLL, CFUNCTYPE, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
 from itertools import pairwise
 from typing import Any
@@ -127,9 +124,3 @@ def trial(facts: dict[str, Any]) -> dict[str, Any]:
     except LibraryError as error:
         return answer | {"ended": str(error)}
     return answer
-
-
-if __name__ == "__main__":
-    found = trial(json.loads(sys.argv[1]))
-    print()
-    print(json.dumps(found))

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import os
 import select
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Literal
 
 from vibroimpact.fmus.processes.python_child import python_command
+
+_ERRORS = {"dropped": subprocess.DEVNULL, "kept": subprocess.PIPE, "shared": None}
 
 
 class Process(subprocess.Popen[bytes]):
@@ -26,8 +29,8 @@ class Process(subprocess.Popen[bytes]):
     ----------
     *arguments : str
         Of Python: `-m` and a module, or a file, then what these are given.
-    errors : int or None
-        Where its standard error goes, as `subprocess` has it; None: where that of this process does.
+    errors : str
+        What becomes of its standard error: `dropped`, `kept` to be read here, or `shared` with this process.
     passed : sequence of int
         Descriptors that it has too.
     environment : mapping, optional
@@ -47,7 +50,7 @@ class Process(subprocess.Popen[bytes]):
     def __init__(
         self,
         *arguments: str,
-        errors: int | None = subprocess.DEVNULL,
+        errors: Literal["dropped", "kept", "shared"] = "dropped",
         passed: Sequence[int] = (),
         environment: Mapping[str, str] | None = None,
         folder: Path | None = None,
@@ -57,7 +60,7 @@ class Process(subprocess.Popen[bytes]):
             python_command(*arguments),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=errors,
+            stderr=_ERRORS[errors],
             pass_fds=passed,
             env=environment,
             cwd=folder,
@@ -83,10 +86,27 @@ class Process(subprocess.Popen[bytes]):
         line, _, self._heard = self._heard.partition(b"\n")
         return line.decode(errors="replace").strip()
 
+    def lines(self) -> Iterator[str]:
+        """Yield the lines that it says, until its answers end."""
+        return _lines(self.stdout)
+
+    def lines_of_errors(self) -> Iterator[str]:
+        """Yield the lines of its standard error, which is kept, until that ends."""
+        assert self.stderr is not None
+        return _lines(self.stderr)
+
     def end(self, seconds: float) -> int:
         """Close the pipe of orders; kill its session where it has not ended after a time, s; return its exit code."""
         with suppress(BrokenPipeError):  # what was still to be said has no reader any more
             self.stdin.close()
+        return self._killed_after(seconds)
+
+    def interrupt(self, seconds: float) -> int:
+        """End it as Ctrl-C does; kill its session where it has not ended after a time, s; return its exit code."""
+        self.send_signal(signal.SIGINT)
+        return self._killed_after(seconds)
+
+    def _killed_after(self, seconds: float) -> int:
         try:
             return self.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -100,3 +120,9 @@ class Process(subprocess.Popen[bytes]):
             return
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, signal.SIGKILL)
+
+
+def _lines(pipe: IO[bytes]) -> Iterator[str]:
+    with io.TextIOWrapper(pipe, encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            yield line.removesuffix("\n")

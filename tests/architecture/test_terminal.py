@@ -6,8 +6,8 @@ import re
 
 from support.places import ROOT
 
-# Run as scripts of their own, before or without the command line.
-SCRIPTS = ("fmus/packaging/build.py", "fmus/packaging/load_check.py", "fmus/packaging/trial_run.py")
+# Run as a script of its own, before the command line is there.
+SCRIPTS = ("fmus/packaging/build.py",)
 WRITES = re.compile(
     r"typer\.(?:echo|secho)\(|\bConsole\(|^\s*print\((?!printable\()|sys\.std(?:out|err)\.write", re.MULTILINE
 )

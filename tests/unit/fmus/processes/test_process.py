@@ -5,30 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
-from collections.abc import Callable
 
-import psutil
 import pytest
+from support.ends import SECONDS, ended, wait_until
 
 from vibroimpact.fmus.processes.process import Process
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sessions are those of POSIX")
-SECONDS = 60.0
-"""Patience with a machine that is busy."""
 STARTER = "import subprocess; print(subprocess.Popen(['sleep', '600']).pid, flush=True); input()"
-
-
-def ended(process: int) -> bool:
-    """Return whether a process has ended."""
-    return not psutil.pid_exists(process) or psutil.Process(process).status() == psutil.STATUS_ZOMBIE
-
-
-def wait_until(happened: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + SECONDS
-    while not happened():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_lines_come_one_by_one_and_none_when_nothing_is_said() -> None:
@@ -36,6 +20,22 @@ def test_lines_come_one_by_one_and_none_when_nothing_is_said() -> None:
         assert [process.line(SECONDS), process.line(SECONDS), process.line(0.05)] == ["a", "b", ""]
         process.say([b"more\n", memoryview(b"\n")])
         assert [process.line(SECONDS), process.line(SECONDS)] == ["more", ""]
+
+
+def test_lines_and_lines_of_errors_come_as_they_are_said_until_the_end() -> None:
+    program = "import sys; print('a\\nb'); print('wrong', file=sys.stderr); sys.stdout.buffer.write(b'\\xff')"
+    with Process("-c", program, errors="kept") as process:
+        assert (list(process.lines()), list(process.lines_of_errors())) == (["a", "b", "\ufffd"], ["wrong"])
+
+
+def test_one_that_is_interrupted_ends_in_good_order_or_is_killed() -> None:
+    good = "import time\ntry:\n print(flush=True); time.sleep(600)\nexcept KeyboardInterrupt:\n raise SystemExit(7)"
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    deaf = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print(flush=True); time.sleep(600)"
+    for program, seconds, code in ((heard + good, SECONDS, 7), (deaf, 0.05, -signal.SIGKILL)):
+        with Process("-c", program) as process:
+            next(process.lines())
+            assert process.interrupt(seconds) == code
 
 
 def test_ctrl_c_of_a_terminal_does_not_reach_it_nor_files_of_the_current_folder() -> None:
