@@ -1,13 +1,7 @@
-"""The process that simulates one point again: `python -m vibroimpact.service.point_process SCENE RESULTS RUN`.
-
-It answers with one line of JSON: the motion in time, its impacts and sections. RESULTS is the folder of a campaign, or
-the dataset of a run; in a sweep with a path the point starts where the one before it had ended.
-"""
+"""What the process does that simulates one point again: its answer is the motion in time, its impacts and sections."""
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -48,15 +42,23 @@ MOST_SAMPLES = MOST_PERIODS * PER_PERIOD + 1
 OBSERVED = ("displacement", "velocity")
 
 
-def main(arguments: list[str]) -> int:
-    """Simulate the point that the arguments name; return the exit code."""
-    scene, results, run = arguments
+def answer(scene: str, results: str, run: int) -> dict[str, Any]:
+    """Return the motion of one point, or why it `failed`.
+
+    Parameters
+    ----------
+    scene : str
+        Scene file.
+    results : str
+        Folder of a campaign, or dataset of a run; in a sweep with a path the point starts where the one before it had
+        ended.
+    run : int
+        Index of the point.
+    """
     try:
-        answer = simulated(Path(scene), Path(results), int(run))
+        return simulated(Path(scene), Path(results), run)
     except VibroimpactError as error:
-        answer = {"failed": str(error)}
-    sys.stdout.write(json.dumps(answer, allow_nan=False) + "\n")
-    return 0
+        return {"failed": str(error)}
 
 
 def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
@@ -226,7 +228,3 @@ def _columns(rows: Any, names: tuple[str, ...]) -> dict[str, list[float | None]]
         return {}
     shown = rows[:MOST_SAMPLES]
     return {name: finite(shown[:, place]) for place, name in enumerate(names[: shown.shape[1]])}
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

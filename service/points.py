@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import threading
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.processes.python_child import ending, python_command
-from vibroimpact.service.child import kill_session
+from vibroimpact.fmus.processes.call import call
+from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.service.problems import ProblemError
 
 DEADLINE = 30.0
@@ -45,7 +42,7 @@ def simulated_point(scene: Path, results: Path, run: int) -> dict[str, Any]:
             {"Retry-After": "1"},
         )
     try:
-        said = _said_by_process(scene, results, run)
+        said = _answer(scene, results, run)
     finally:
         _FREE.release()
     if "failed" in said:
@@ -53,33 +50,18 @@ def simulated_point(scene: Path, results: Path, run: int) -> dict[str, Any]:
     return said
 
 
-def _said_by_process(scene: Path, results: Path, run: int) -> dict[str, Any]:
-    module = "vibroimpact.service.point_process"
-    process = subprocess.Popen(
-        python_command("-m", module, str(scene), str(results), str(run)),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        encoding="utf-8",
-        errors="replace",
-        start_new_session=os.name == "posix",
-    )
-    with process:
-        try:
-            out, said = process.communicate(timeout=DEADLINE)
-        except subprocess.TimeoutExpired:
-            raise ProblemError(
-                HTTPStatus.UNPROCESSABLE_ENTITY,
-                f"run: expected a point of at most {DEADLINE:g} s, got one that takes longer. "
-                "Simulate it with the command line.",
-            ) from None
-        finally:
-            kill_session(process)
-    lines = out.splitlines()
-    if process.returncode or not lines:
-        last = said.strip().splitlines()[-1:] or [""]
+def _answer(scene: Path, results: Path, run: int) -> dict[str, Any]:
+    function = "vibroimpact.service.point_process:answer"
+    done = call(function, str(scene), str(results), run, seconds=DEADLINE)
+    if done.is_late:
         raise ProblemError(
-            HTTPStatus.UNPROCESSABLE_ENTITY, f"run: its process {ending(process.returncode)}: {last[0]}"
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            f"run: expected a point of at most {DEADLINE:g} s, got one that takes longer. "
+            "Simulate it with the command line.",
         )
-    found: dict[str, Any] = json.loads(lines[-1])  # an FMU may print before it
+    if done.code or done.answer is None:
+        raise ProblemError(
+            HTTPStatus.UNPROCESSABLE_ENTITY, f"run: its process {ending(done.code)}: {done.last_line}"
+        )
+    found: dict[str, Any] = done.answer
     return found
