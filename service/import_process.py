@@ -1,4 +1,4 @@
-"""The process that imports one file: `python -m vibroimpact.service.import_process FILE RECORDING SETTINGS`.
+"""What the process does that imports one file.
 
 What a stranger has uploaded is read here, where a library that crashes, hangs or fills the memory takes nothing else
 with it.
@@ -15,8 +15,8 @@ from vibroimpact.analysis.recording import Recording, write_recording
 from vibroimpact.fmus.confinement import machine_memory
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.hardware.recordings import import_recording
-from vibroimpact.service.child import FULL, begin_as_child, say
 from vibroimpact.service.memory import import_memory
+from vibroimpact.service.child import FULL
 
 
 def limit_memory(wanted: int) -> None:
@@ -39,26 +39,31 @@ def contents(recording: Recording) -> list[dict[str, Any]]:
     return channels + events
 
 
-def main(arguments: list[str]) -> int:
-    """Import the file that the arguments name; return the exit code."""
-    file, target, settings = Path(arguments[0]), Path(arguments[1]), json.loads(arguments[2])
-    begin_as_child()
+def answer(file: str, target: str, settings: str) -> dict[str, Any]:
+    """Import a file; return the `channels` of its recording, why it `failed`, or the error of a disk that is `full`.
+
+    Parameters
+    ----------
+    file : str
+        What was uploaded.
+    target : str
+        Where its recording is written.
+    settings : str
+        Of the import, JSON.
+    """
+    path = Path(file)
     memory = import_memory(machine_memory())
     limit_memory(memory)
     try:
-        recording = import_recording(file, settings)
-        write_recording(recording, target)
-        say(channels=contents(recording))
+        recording = import_recording(path, json.loads(settings))
+        write_recording(recording, Path(target))
     except VibroimpactError as error:
-        say(failed=str(error).replace(f"{file.parent}/", ""))  # its folder is the service's own matter
+        return {"failed": str(error).replace(f"{path.parent}/", "")}  # its folder is the service's own matter
     except MemoryError:
-        say(failed=f"{file.name}: expected a recording, got more than fits into {memory / 2**30:.0f} GiB.")
+        gib = memory / 2**30
+        return {"failed": f"{path.name}: expected a recording, got more than fits into {gib:.0f} GiB."}
     except OSError as error:
         if error.errno not in FULL:
             raise
-        say(full=[error.errno, error.strerror])
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+        return {"full": [error.errno, error.strerror]}
+    return {"channels": contents(recording)}

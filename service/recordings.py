@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import threading
 import time
 import uuid
 from collections.abc import Sequence
@@ -15,8 +13,8 @@ from typing import Any
 from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import is_device
-from vibroimpact.fmus.processes.python_child import ending, python_command
-from vibroimpact.service.child import kill_session
+from vibroimpact.fmus.processes.call import call
+from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.service.store import OUTPUTS, Store
 
 PART = "part-"
@@ -209,28 +207,14 @@ def imported(file: Path, target: Path, settings: str) -> list[dict[str, Any]]:
     UsageError
         It is no recording, or its import did not end.
     """
-    process = subprocess.Popen(
-        python_command("-m", "vibroimpact.service.import_process", str(file), str(target), settings),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    hung = threading.Timer(IMPORT_SECONDS, kill_session, [process])
-    with process:
-        assert process.stdout is not None
-        hung.start()
-        said = process.stdout.read().splitlines()
-        process.wait()
-    hung.cancel()
-    told = json.loads(said[-1]) if said else {}
+    function = "vibroimpact.service.import_process:answer"
+    done = call(function, str(file), str(target), settings, seconds=IMPORT_SECONDS, errors="dropped")
+    told = done.answer or {}
     if "full" in told:
         raise OSError(*told["full"])
     if "channels" not in told:
-        late = f", after {IMPORT_SECONDS:.0f} s" if hung.finished.is_set() and process.returncode < 0 else ""
-        end = (
-            f"{file.name}: expected a recording, got a file whose import {ending(process.returncode)}{late}."
-        )
+        late = f", after {IMPORT_SECONDS:.0f} s" if done.is_late else ""
+        end = f"{file.name}: expected a recording, got a file whose import {ending(done.code)}{late}."
         why = told.get("failed") or end
         raise UsageError(str(why))
     channels: list[dict[str, Any]] = told["channels"]
