@@ -18,7 +18,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from vibroimpact.service.child import SHORT
+from vibroimpact.service.passing import SHORT
 from vibroimpact.service.problems import MEDIA_TYPE, problem
 from vibroimpact.service.turns import Turns
 

@@ -16,7 +16,7 @@ from vibroimpact.fmus.confinement import machine_memory
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.hardware.recordings import import_recording
 from vibroimpact.service.memory import import_memory
-from vibroimpact.service.child import FULL
+from vibroimpact.service.passing import FULL
 
 
 def limit_memory(wanted: int) -> None:

@@ -7,6 +7,7 @@ standard output, and ends when its standard input does: then the service is gone
 from __future__ import annotations
 
 import json
+import os
 import socket
 import sys
 import tempfile
@@ -20,12 +21,13 @@ from urllib.parse import urlsplit
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError, VibroimpactError, WorkersGoneError
+from vibroimpact.fmus.processes.child import end_when_closed, private_pipes
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
-from vibroimpact.service.child import FULL, SHORT, begin_as_child, say
+from vibroimpact.service.passing import FULL, SHORT
 
 SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
 """Seconds between two lines of progress, at least, and part of all points: each becomes an event that is kept."""
@@ -61,6 +63,12 @@ class Work:
     def written(self) -> str:
         """Return it as one word of a command line."""
         return json.dumps(asdict(self))
+
+
+def say(**what: Any) -> None:
+    """Tell the service something: one line of JSON on standard output."""
+    sys.stdout.write(json.dumps(what) + "\n")
+    sys.stdout.flush()
 
 
 class Told(Progress):
@@ -138,7 +146,9 @@ def _replay(scene: Scene, folder: Path, fit: str | None = None, score: list[str]
 def main(arguments: list[str]) -> int:
     """Run the job that the arguments name; return the exit code."""
     folder, work = Path(arguments[0]), Work(**json.loads(arguments[1]))
-    begin_as_child()
+    orders, answers = private_pipes()
+    end_when_closed(orders)
+    sys.stdout = os.fdopen(answers, "w", encoding="utf-8")
     try:
         run(folder, work)
     except CampaignInterrupted as interrupted:

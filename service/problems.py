@@ -13,7 +13,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from vibroimpact.service.child import FULL, SHORT
+from vibroimpact.service.passing import FULL, SHORT
 
 _FULL_DATABASE = ("SQLITE_FULL", "SQLITE_IOERR_WRITE", "SQLITE_IOERR_FSYNC", "SQLITE_IOERR_SHMSIZE")
 _HELD_DATABASE = ("SQLITE_BUSY", "SQLITE_LOCKED")

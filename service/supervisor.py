@@ -6,13 +6,10 @@ ends it; what is known of it is in the store. So a service that is killed and st
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import json
-import os
 import signal
 import sqlite3
-import subprocess
 import threading
 import time
 from collections import Counter, deque
@@ -21,8 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-from vibroimpact.fmus.processes.python_child import ending, python_command
-from vibroimpact.service.child import kill_session
+from vibroimpact.fmus.processes.process import Process
+from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.service.job_process import INTERRUPTED, LATER, Work
 from vibroimpact.service.problems import is_full, is_held, is_short, why_later
 from vibroimpact.service.store import LOG, LOG_FILE, Job, State, Store
@@ -55,7 +52,7 @@ class Supervisor:
         self._store, self._scheduler = store, scheduler
         self._closing = threading.Event()
         self._lock = threading.Lock()
-        self._running: tuple[str, subprocess.Popen[str]] | None = None
+        self._running: tuple[str, Process] | None = None
         self._pause = 0.0
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
 
@@ -140,6 +137,7 @@ class Supervisor:
                 with process:  # closes its pipes
                     told = self._listen(job, process, log)
                     code = process.wait()
+                    process.kill_session()  # workers that outlived it
         except OSError as error:
             if why := why_later(error):
                 self._change(job, state=State.queued, message=f"{why}: {error}", attempts=job.attempts)
@@ -148,45 +146,33 @@ class Supervisor:
             raise
         with self._lock:
             self._running = None
-        kill_session(process)  # workers that outlived it
         self._note_end(job, code, told)
 
-    def _open(self, job: Job, folder: Path) -> subprocess.Popen[str]:
+    def _open(self, job: Job, folder: Path) -> Process:
         work = Work(job.kind, job.workers, self._scheduler, job.options)
-        arguments = ("-m", "vibroimpact.service.job_process", str(folder.absolute()), work.written())
-        process = subprocess.Popen(
-            python_command(*arguments),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-            start_new_session=True,
-        )
+        folder, module = folder.absolute(), "vibroimpact.service.job_process"
+        process = Process("-m", module, str(folder), work.written(), errors="kept")
         with self._lock:
             self._running = (job.id, process)
         if self._closing.is_set() or self._store.job(job.id).state == State.cancelling:
             self._stop(job.id)
         return process
 
-    def _listen(self, job: Job, process: subprocess.Popen[str], log: JobLog) -> Told:
+    def _listen(self, job: Job, process: Process, log: JobLog) -> Told:
         """Follow what a process says until it ends."""
-        assert process.stdout is not None
-        assert process.stderr is not None
         told = Told()
 
-        def copy_errors(stream: Any) -> None:
-            for line in stream:
-                told.last.append(line.rstrip("\n"))
-                log.write(told.last[-1])
+        def copy_errors() -> None:
+            for line in process.lines_of_errors():
+                told.last.append(line)
+                log.write(line)
 
-        errors = threading.Thread(target=copy_errors, args=(process.stderr,), daemon=True)
+        errors = threading.Thread(target=copy_errors, daemon=True)
         try:
             errors.start()
         except RuntimeError as error:  # no thread more: the machine is short of memory or processes
             raise OSError(errno.ENOMEM, str(error)) from error
-        for line in process.stdout:
+        for line in process.lines():
             said = _said(line)
             total, done = said.get("total"), said.get("done")
             if isinstance(total, int) and isinstance(done, int):
@@ -261,12 +247,7 @@ class Supervisor:
             if self._running is None or (name is not None and self._running[0] != name):
                 return
             _, process = self._running
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(process.pid, signal.SIGINT)
-        try:
-            process.wait(timeout=GRACE)
-        except subprocess.TimeoutExpired:
-            kill_session(process)
+        process.interrupt(GRACE)
 
 
 @dataclass(slots=True)
@@ -321,7 +302,7 @@ def _said(line: str) -> dict[str, Any]:
         said = json.loads(line)
     except ValueError:
         said = None
-    return said if isinstance(said, dict) else {"note": line.rstrip("\n")}
+    return said if isinstance(said, dict) else {"note": line}
 
 
 def _sum(first: Mapping[str, int], second: Mapping[str, int]) -> dict[str, int]:

@@ -6,7 +6,6 @@ import asyncio
 import errno
 import os
 import sqlite3
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
+from vibroimpact.fmus.processes.process import Process
 from vibroimpact.service import store as store_module
 from vibroimpact.service import supervisor as module
 from vibroimpact.service.problems import answer_problems
@@ -33,7 +33,7 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
     monkeypatch.setattr(store_module, "HELD_SECONDS", 0.01)
     monkeypatch.setattr(module, "PAUSE", 0.05)
     monkeypatch.setattr(module, "IDLE", 0.02)
-    monkeypatch.setattr(module, "python_command", lambda *_: [sys.executable, "-c", WORKS])
+    monkeypatch.setattr(module, "Process", lambda *_, **options: Process("-c", WORKS, **options))
     opened = Store(tmp_path)
     yield opened
     opened.close()
@@ -101,7 +101,7 @@ def test_a_job_is_taken_up_again_after_a_database_that_failed(
 
 @pytest.mark.usefixtures("supervisor")
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC])
-@pytest.mark.parametrize("place", ["Popen", "JobLog"])
+@pytest.mark.parametrize("place", ["Process", "JobLog"])
 def test_a_short_machine_delays_jobs_and_is_said_once(
     store: Store, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, place: str, number: int
 ) -> None:
@@ -113,7 +113,7 @@ def test_a_short_machine_delays_jobs_and_is_said_once(
 
     monkeypatch.setattr(module, "LONGEST_PAUSE", 0.05)
     with monkeypatch.context() as patched, caplog.at_level("WARNING"):
-        patched.setattr(module.subprocess if place == "Popen" else module, place, refuse)
+        patched.setattr(module, place, refuse)
         jobs = [store.submit(ASKED)[0] for _ in range(3)]
         for _ in range(6):
             assert refusals.acquire(timeout=20.0)
