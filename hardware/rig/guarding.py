@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import select
-import subprocess
-import time
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 
 from vibroimpact.fmus.errors import RigError
-from vibroimpact.fmus.processes.python_child import ending, python_command
+from vibroimpact.fmus.processes.process import Process
+from vibroimpact.fmus.processes.python_child import ending
 
 MODULE = "vibroimpact.hardware.rig.guardian"
 READY_SECONDS = 30.0
@@ -70,16 +66,9 @@ class Guardian:
 
     def __init__(self, order: Order) -> None:
         try:
-            self._process = subprocess.Popen(
-                python_command("-m", MODULE),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                start_new_session=True,  # Ctrl-C and the end of a terminal are not for it
-                pass_fds=[order.descriptor],
-            )
+            self._process = Process("-m", MODULE, errors="shared", passed=[order.descriptor])
         except OSError as error:
             raise RigError(f"guardian: cannot be started ({error.strerror}). Nothing was driven.") from None
-        self._heard = b""
         self._tell(json.dumps(asdict(order)))
 
     def await_ready(self) -> None:
@@ -90,7 +79,7 @@ class Guardian:
         RigError
             It does not.
         """
-        said = self._line(READY_SECONDS)
+        said = self._process.line(READY_SECONDS)
         if said != READY:
             raise RigError(
                 f"guardian: expected one that is ready, got {said or self._end()}. Nothing was driven."
@@ -104,21 +93,13 @@ class Guardian:
     def take_over(self, seconds: float) -> str:
         """Let it bring the output to rest; return an empty text, or why it cannot."""
         self._tell(TAKE_OVER)
-        said = self._line(seconds)
+        said = self._process.line(seconds)
         return "" if said == REST else said or f"the guardian did not answer ({self._end()})"
 
     def leave(self) -> None:
         """Let it end, since the output is at rest; no process remains."""
         self._tell(REST)
-        with suppress(OSError):
-            assert self._process.stdin is not None
-            self._process.stdin.close()
-        try:
-            self._process.wait(LEAVE_SECONDS)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        assert self._process.stdout is not None
+        self._process.end(LEAVE_SECONDS)
         self._process.stdout.close()
 
     def _end(self) -> str:
@@ -126,21 +107,4 @@ class Guardian:
         return "no answer" if code is None else f"a process that {ending(code)}"
 
     def _tell(self, text: str) -> None:
-        assert self._process.stdin is not None
-        with suppress(OSError):  # it has gone, which is seen elsewhere
-            self._process.stdin.write(f"{text}\n".encode())
-            self._process.stdin.flush()
-
-    def _line(self, seconds: float) -> str:
-        """Return the next line that it says; empty: none came."""
-        assert self._process.stdout is not None
-        descriptor, end = self._process.stdout.fileno(), time.monotonic() + seconds
-        while b"\n" not in self._heard:
-            if not select.select([descriptor], [], [], max(end - time.monotonic(), 0.0))[0]:
-                return ""
-            part = os.read(descriptor, 4096)
-            if not part:
-                return ""
-            self._heard += part
-        line, _, self._heard = self._heard.partition(b"\n")
-        return line.decode(errors="replace").strip()
+        self._process.say([f"{text}\n".encode()])
