@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import time
 from contextlib import suppress
 from pathlib import Path
 
 from vibroimpact.analysis import figures, open_dataset
 from vibroimpact.analysis.dataset.outputs import writing
-from vibroimpact.fmus.processes.python_child import python_command
+from vibroimpact.fmus.processes.process import Process
 
 FILE = "live.png"
 SECONDS = 5.0
@@ -30,7 +29,7 @@ class LiveFigure:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._drawn = time.monotonic()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Process | None = None
 
     def follow(self) -> None:
         """Draw what the folder has by now, if some seconds have passed since it was drawn."""
@@ -48,19 +47,15 @@ class LiveFigure:
     def close(self) -> None:
         """Let no drawing go on."""
         if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+            with self._process:
+                self._process.kill_session()
             self._process = None
 
     def _start(self) -> None:
+        self.close()
         self._drawn = time.monotonic()
         folder, figure = str(self._folder), str(self._folder / FILE)
-        self._process = subprocess.Popen(
-            python_command("-m", _COMMANDS, "plot", folder, "-o", figure, "--kind", KIND),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,  # what is wrong is said by the last drawing
-            start_new_session=True,  # Ctrl-C ends the sweep, not its figure
-        )
+        # what is wrong is said by the last drawing
+        self._process = Process("-m", _COMMANDS, "plot", folder, "-o", figure, "--kind", KIND)
         with suppress(OSError, AttributeError):  # where priorities are not to be had
             os.setpriority(os.PRIO_PROCESS, self._process.pid, 10)
