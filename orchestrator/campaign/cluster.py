@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,6 @@ from vibroimpact.fmus.surroundings import (
 )
 from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.campaign.computation import Computation
-from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.run.progress import Progress
@@ -205,11 +205,30 @@ def _embedded_cluster(workers: int, scratch: Path) -> Iterator[Cluster]:
         _kill_workers(cluster)
 
 
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Let the threads and processes that begin here not hear Ctrl-C: it is for this thread alone.
+
+    A terminal sends the signal to every process of the command. A blocked signal is inherited by threads and
+    by the processes they start, also by those that replace a dead worker later. Here it only waits.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # Start it now: starting it unblocks SIGINT in the calling thread.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _started_workers(workers: int, scratch: Path) -> LocalCluster:
     """Start workers on this machine, again where one of them died before it was up."""
     for _ in range(MOST_STARTS):
         try:
-            with interrupts_blocked():
+            with _interrupts_blocked():
                 return LocalCluster(
                     n_workers=workers,
                     threads_per_worker=1,

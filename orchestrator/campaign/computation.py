@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from vibroimpact.fmus.processes.call import ProcessDied, call_alone
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
-from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
 from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 

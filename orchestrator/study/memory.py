@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import os
 import sys
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
+from vibroimpact.fmus.processes.call import ProcessDied, call_alone
+from vibroimpact.fmus.processes.fork import forked
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.processor import processor_time_of_all
 from vibroimpact.orchestrator.study.ways.all_ways import ways_of
@@ -71,16 +71,7 @@ def _in_forks(
 def memory_in_fork(way: Way, part: float = 1.0) -> int:
     """Open and run a way in a fork of this process; return what its resident memory grew by at most, bytes."""
     answers, answer = os.pipe()
-    with warnings.catch_warnings():
-        # the other thread waits for the end of the parent alone, and holds nothing
-        warnings.simplefilter("ignore", DeprecationWarning)
-        process = os.fork()
-    if process == 0:
-        try:
-            os.close(answers)
-            os.write(answer, str(_growth(way, part)).encode())
-        finally:
-            os._exit(0)  # whatever it was, nothing else of this process runs twice
+    process = forked(lambda: os.write(answer, str(_growth(way, part)).encode()))
     os.close(answer)
     with os.fdopen(answers) as pipe:
         said = pipe.read()

@@ -125,9 +125,7 @@ def test_a_rig_records_to_an_absolute_path_without_a_current_folder(
 
 def test_a_process_of_its_own_finds_the_folder_that_it_is_started_in(removed: Callable[[], None]) -> None:
     """`accuracy` showed a traceback: the folder was gone before the process that measures memory came to it."""
-    program = (
-        "from vibroimpact.orchestrator.campaign.lone_process import call_alone; print(call_alone(abs, -3))"
-    )
+    program = "from vibroimpact.fmus.processes.call import call_alone; print(call_alone(abs, -3))"
     done = subprocess.run(
         [sys.executable, "-P", "-c", program],
         preexec_fn=removed,

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from support.memory_of_c import memories_of_c
 
-from vibroimpact.orchestrator.campaign.lone_process import call_alone
+from vibroimpact.fmus.processes.call import call_alone
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.memory import IS_MEASURED, memory_of_ways
 from vibroimpact.orchestrator.study.ways.all_ways import ways_of
