@@ -15,10 +15,12 @@ import os
 import select
 import signal
 import sys
-from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from collections.abc import Mapping
+from typing import Any
 
 from vibroimpact.fmus.confinement import confine, end_with_parent
+from vibroimpact.fmus.processes.child import write_whole
+from vibroimpact.fmus.processes.fork import forked
 
 #: After this time without a file to read the server ends, s.
 IDLE = 30.0
@@ -26,8 +28,6 @@ LONGEST_TEXT = 20_000
 _LATE = frozenset(
     getattr(signal, name) for name in ("SIGALRM", "SIGPROF", "SIGXCPU") if hasattr(signal, name)
 )
-
-Message = tuple[bytes, Sequence[Any]]
 
 
 def import_libraries(order: Mapping[str, Any]) -> None:
@@ -37,8 +37,8 @@ def import_libraries(order: Mapping[str, Any]) -> None:
             importlib.import_module(name)
 
 
-def read_and_end(order: Mapping[str, Any], parent: int, answers: int, begins: int | None = None) -> NoReturn:
-    """Read a file within limits, answer, and end this process.
+def read_in_limits(order: Mapping[str, Any], parent: int, answers: int, begins: int | None = None) -> None:
+    """Read a file within limits, and answer; this process is a fork that does nothing else.
 
     Parameters
     ----------
@@ -49,32 +49,27 @@ def read_and_end(order: Mapping[str, Any], parent: int, answers: int, begins: in
     answers, begins : int
         Descriptors: of the answer, and of a byte that says that it begins.
     """
-    code = 1
-    try:
-        end_with_parent(parent)
-        confine(order["seconds"], order["memory"])
-        message = read_here(order)
-        for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # whoever takes the answer may be slow
-            signal.setitimer(timer, 0.0)
-        if begins is not None:
-            os.write(begins, b"1")
-        send(answers, message)
-        code = 0
-    finally:
-        os._exit(code)
+    end_with_parent(parent)
+    confine(order["seconds"], order["memory"])
+    message = read_here(order)
+    for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # whoever takes the answer may be slow
+        signal.setitimer(timer, 0.0)
+    if begins is not None:
+        os.write(begins, b"1")
+    write_whole(answers, message)
 
 
-def read_here(order: Mapping[str, Any]) -> Message:
+def read_here(order: Mapping[str, Any]) -> list[Any]:
     """Read the file of an order in this process; return the line that answers and its buffers."""
     try:
         module, _, function = order["reader"].partition(":")
         facts, buffers = getattr(importlib.import_module(module), function)(order["path"], order["options"])
         views = [memoryview(buffer).cast("B") for buffer in buffers]
         found = {"verdict": "read", "facts": facts, "sizes": [view.nbytes for view in views]}
-        return _line(found), views
+        return [_line(found), *views]
     # whatever it is, it is what the file does to its reader
     except BaseException as error:
-        return _line(_raised(error)), ()
+        return [_line(_raised(error))]
 
 
 def _raised(error: BaseException) -> dict[str, Any]:
@@ -98,23 +93,11 @@ def _line(found: dict[str, Any]) -> bytes:
     return json.dumps(found).encode() + b"\n"
 
 
-def send(answers: int, message: Message) -> None:
-    """Write a line and its buffers whole."""
-    line, buffers = message
-    for part in (line, *buffers):
-        rest = memoryview(part)
-        while rest:
-            rest = rest[os.write(answers, rest) :]
-
-
 def _read_in_fork(order: dict[str, Any], answers: int) -> None:
     """Let a process of its own read the file of an order, and answer; say how it ended where it does not."""
     has_begun, begins = os.pipe()
     server = os.getpid()
-    process = os.fork()
-    if process == 0:
-        os.close(has_begun)
-        read_and_end(order, server, answers, begins)
+    process = forked(lambda: read_in_limits(order, server, answers, begins))
     os.close(begins)
     with os.fdopen(has_begun, "rb") as pipe:
         # standard input speaks only when nobody waits for this answer any more
@@ -125,7 +108,7 @@ def _read_in_fork(order: dict[str, Any], answers: int) -> None:
     if status and answered:
         os._exit(1)  # within its answer, which nobody can read on from
     if not answered:
-        send(answers, (_line(how_it_ended(status)), ()))
+        write_whole(answers, [_line(how_it_ended(status))])
 
 
 def main() -> None:
@@ -142,7 +125,7 @@ def main() -> None:
         if forks:
             _read_in_fork(order, answers)
         else:
-            send(answers, read_here(order))
+            write_whole(answers, read_here(order))
 
 
 if __name__ == "__main__":

@@ -7,17 +7,16 @@ other threads; one that waits for a lock of theirs is given up, and says nothing
 from __future__ import annotations
 
 import contextlib
-import gc
 import os
 import signal
 import threading
 import time
-import warnings
 from dataclasses import asdict
 from pathlib import Path
 
 from vibroimpact.fmus.confinement import PATIENCE
-from vibroimpact.fmus.reader_child import how_it_ended, import_libraries, read_and_end
+from vibroimpact.fmus.processes.fork import forked
+from vibroimpact.fmus.reader_child import how_it_ended, import_libraries, read_in_limits
 from vibroimpact.fmus.reader_orders import Answer, Order, received
 
 #: Wall time beyond that of the limits after which a fork is killed, s: the fork itself ends before.
@@ -75,18 +74,16 @@ def read_in_fork(order: Order) -> Answer | None:
     import_libraries(given)
     parent = os.getpid()
     answers, answer = os.pipe()
+
+    def read() -> None:
+        _leave_all_files(answer)
+        read_in_limits(given, parent, _ANSWER)
+
     try:
-        process = _forked()
+        process = forked(read)
     except OSError:
         os.close(answers)
         return None
-    else:
-        if process == 0:
-            try:
-                _leave_all_files(answer)
-                read_and_end(given, parent, _ANSWER)
-            finally:
-                os._exit(1)
     finally:
         os.close(answer)
     watch = _Watch(process, PATIENCE * order.seconds + GRACE)
@@ -101,23 +98,6 @@ def read_in_fork(order: Order) -> Answer | None:
     waited = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM
     ended = how_it_ended(status)
     return None if waited or watch.is_stuck else Answer(ended["verdict"], error=ended["error"])
-
-
-def _forked() -> int:
-    """Fork; objects of this process end with it, not in its copy: a collection may come while the copy begins."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        with warnings.catch_warnings():
-            # of Python 3.12 and of libraries: that threads are lost
-            warnings.simplefilter("ignore")
-            process = os.fork()
-        if process == 0:
-            gc.freeze()
-        return process
-    finally:
-        if collects:
-            gc.enable()
 
 
 def _end(process: int) -> int:

@@ -8,20 +8,17 @@ with the first file, serves all that follow, and ends by itself when none comes.
 from __future__ import annotations
 
 import atexit
-import io
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
-from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
 from vibroimpact.fmus.confinement import PATIENCE
-from vibroimpact.fmus.processes.python_child import python_command
-from vibroimpact.fmus.reader_child import send
+from vibroimpact.fmus.processes.child import write_whole
+from vibroimpact.fmus.processes.process import Process
 from vibroimpact.fmus.reader_fork import read_in_fork
 from vibroimpact.fmus.reader_orders import Answer, Order, received
 
@@ -55,7 +52,7 @@ class ReaderServer:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Process | None = None
 
     def ask(self, order: Order) -> Answer:
         """Return what reading the file of an order came to."""
@@ -71,27 +68,18 @@ class ReaderServer:
     def _start(self) -> None:
         self.close()
         environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-        self._process = subprocess.Popen(
-            python_command(str(_CHILD)),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            bufsize=0,
-            env=environment,
-        )
+        self._process = Process(str(_CHILD), environment=environment)
 
     def _answer(self, line: bytes, order: Order) -> Answer | None:
         """Return the answer; None where the process is gone, which it is some time after the order's."""
         process = self._process
         if process is None:
             return None
-        assert process.stdin is not None
-        assert isinstance(process.stdout, io.RawIOBase)
         late = threading.Timer(PATIENCE * order.seconds + START_SECONDS, process.kill)
         late.daemon = True
         late.start()
         try:
-            send(process.stdin.fileno(), (line, ()))
+            write_whole(process.stdin.fileno(), [line])
             with open(process.stdout.fileno(), "rb", closefd=False) as stream:
                 answer = received(stream, order.most_bytes)
             if answer is None:  # nothing more that it says would be an answer
@@ -111,24 +99,15 @@ class ReaderServer:
         process, self._process = self._process, None
         if process is None:
             return
-        assert process.stdin is not None
-        assert process.stdout is not None
-        with suppress(BrokenPipeError):
-            process.stdin.close()
-        try:
-            process.wait(STOP_SECONDS)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        process.end(STOP_SECONDS)
         process.stdout.close()
 
     def forget(self) -> None:
         """Let a process made by `fork` not read the answers of the one that it was made from."""
         process, self._lock, self._process = self._process, threading.Lock(), None
         if process is not None:
-            for pipe in (process.stdin, process.stdout):
-                assert pipe is not None
-                pipe.close()
+            process.stdin.close()
+            process.stdout.close()
             process.returncode = 0  # it is no child of this one
 
 
