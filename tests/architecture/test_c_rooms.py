@@ -14,6 +14,7 @@ FLOORS = (
     ("contact", "measuring", "modes"),
     ("body",),
     ("body/modal",),
+    ("body/modal/structure",),
     ("door",),
     ("lanes",),
 )

@@ -34,17 +34,17 @@ CHOSEN = {
         "return approach * approach <= 0.0 * fabs(acceleration) * resolution;",
     ),
     "the impulse of a summed chatter is off by 1e-6": (
-        "core/body/modal/structure_impact.c",
+        "core/body/modal/structure/impact.c",
         "(1.0 + restitution) * rebound / (view.mobility",
         "(1.0 + restitution) * (1.0 + 1e-6) * rebound / (view.mobility",
     ),
     "the wanted change of velocity is off by 1e-9": (
-        "core/body/modal/structure_impact.c",
+        "core/body/modal/structure/impact.c",
         "(1.0 + restitution[k]) * approach[k]",
         "(1.0 + restitution[k]) * (1.0 + 1e-9) * approach[k]",
     ),
     "impacts count nothing as loss": (
-        "core/body/modal/structure_impact.c",
+        "core/body/modal/structure/impact.c",
         "state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;",
         "state->energies.contact_loss += 0.0 * before;",
     ),
@@ -99,7 +99,7 @@ CHOSEN = {
         "return press->stiffness * (power + press->damping * (1.0 + 1e-9) * drag);",
     ),
     "a relaxing surface comes back 1e-6 faster": (
-        "core/body/modal/structure_events.c",
+        "core/body/modal/structure/events.c",
         "tau = contact->relaxation_time;",
         "tau = contact->relaxation_time * (1.0 - 1e-6);",
     ),

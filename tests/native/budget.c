@@ -2,7 +2,7 @@
  * go on, or leaves the numbers, is given up. */
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
-#include "body/modal/structure.h"
+#include "body/modal/structure/structure.h"
 
 #include <math.h>
 #include <string.h>

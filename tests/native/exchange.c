@@ -1,6 +1,6 @@
 /* A body that its importer integrates: impacts, chatter to rest and release, stops that yield, by plain steps of Euler. */
-#include "body/modal/structure.h"
-#include "body/modal/structure_exchange.h"
+#include "body/modal/structure/exchange.h"
+#include "body/modal/structure/structure.h"
 
 #include <math.h>
 #include <string.h>

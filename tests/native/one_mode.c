@@ -2,8 +2,8 @@
  * ever; a copy goes on bit for bit; a mirror image is a mirror image. */
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
-#include "body/modal/structure.h"
-#include "body/modal/structure_impact.h"
+#include "body/modal/structure/impact.h"
+#include "body/modal/structure/structure.h"
 
 #include <math.h>
 #include <string.h>

@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "body/modal/coupled_flow.h"
-#include "body/modal/structure.h"
-#include "body/modal/structure_forces.h"
+#include "body/modal/forces.h"
+#include "body/modal/structure/structure.h"
 #include "check.h"
 
 enum { RUNS = 400, SEGMENTS = 40 };

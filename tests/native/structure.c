@@ -2,12 +2,12 @@
  * stop, never back in time, never for ever; stops only push. */
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
-#include "body/modal/structure.h"
+#include "body/modal/structure/structure.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "body/modal/structure_impact.h"
+#include "body/modal/structure/impact.h"
 #include "check.h"
 
 enum { RUNS = 10000 };

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "body/modal/structure_component.h"
+#include "body/modal/structure/component.h"
 #include "modes/beam_residual.h"
 #include "motion/amplitude.h"
 

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "body/modal/structure_component.h"
+#include "body/modal/structure/component.h"
 #include "modes/chain_modes.h"
 
 /* All of a Chain's variables and state (variables.toml says what each is); copying it copies the Chain. */

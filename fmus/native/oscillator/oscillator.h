@@ -2,7 +2,7 @@
 #ifndef VIBROIMPACT_OSCILLATOR_H
 #define VIBROIMPACT_OSCILLATOR_H
 
-#include "body/modal/structure_component.h"
+#include "body/modal/structure/component.h"
 #include "motion/amplitude.h"
 
 /* All of an Oscillator's variables and state (variables.toml says what each is); copying it copies the Oscillator. */

@@ -6,7 +6,7 @@
 
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
-#include "body/modal/structure.h"
+#include "body/modal/structure/structure.h"
 
 struct vi_door_structure {
     vi_structure_model model;

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "body/modal/modal_scan.h"
-#include "body/modal/structure.h"
-#include "body/modal/structure_contact.h"
+#include "body/modal/structure/contact.h"
+#include "body/modal/structure/structure.h"
 
 /* A body of one mode, mass-normalised, with at most one stop. */
 typedef struct {

@@ -11,7 +11,7 @@
 
 #include <math.h>
 
-#include "body/modal/structure_state.h"
+#include "body/modal/state.h"
 #include "contact/press.h"
 #include "motion/polynomial.h"
 #include "motion/rows.h"

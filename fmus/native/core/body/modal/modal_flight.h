@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "body/modal/structure_state.h"
+#include "body/modal/state.h"
 #include "motion/flow.h"
 #include "motion/majorant.h"
 #include "motion/origin.h"

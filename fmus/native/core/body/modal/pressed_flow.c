@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "body/modal/structure_forces.h"
-#include "body/modal/structure_held.h"
+#include "body/modal/forces.h"
+#include "body/modal/held.h"
 #include "modes/pressed_modes.h"
 #include "modes/pressed_response.h"
 #include "motion/ripple.h"

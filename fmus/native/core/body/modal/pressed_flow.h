@@ -6,7 +6,7 @@
 #ifndef VIBROIMPACT_PRESSED_FLOW_H
 #define VIBROIMPACT_PRESSED_FLOW_H
 
-#include "body/modal/structure_state.h"
+#include "body/modal/state.h"
 #include "modes/coupled_modes.h"
 #include "modes/coupled_response.h"
 #include "modes/pressed_terms.h"

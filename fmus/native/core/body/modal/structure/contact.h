@@ -1,0 +1,44 @@
+/* The moments of one contact: rest, release, and compliant stops from touch-down to separation. */
+#ifndef VIBROIMPACT_STRUCTURE_CONTACT_H
+#define VIBROIMPACT_STRUCTURE_CONTACT_H
+
+#include <stdbool.h>
+
+#include "body/modal/state.h"
+
+/* Contact k rests from `delay` seconds after now on, the end of a chatter with that impulse, N s; it is let go, and leaves
+ * as `leaving` of the state says. */
+void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_impulse);
+void vi_structure_release(const vi_structure *s, int k, int leaving);
+
+/* A recording begins: what goes on began before it, unless the motion begins here too. */
+void vi_structure_begin_recording(const vi_structure *s);
+
+/* A period ends: the contacts that have begun in it are counted in it, as far as they are known to be impacts. */
+void vi_structure_count_contacts(const vi_structure *s);
+
+/* Does a rest, or a contact with a stop that yields, go on at contact k that began in the present recording? */
+bool vi_structure_is_open(const vi_structure *s, int k);
+
+/* A compliant stop begins to be pressed in; it ends, and the contact may recede before its surface has come back. */
+void vi_structure_touch_down(const vi_structure *s, int k);
+void vi_structure_separate(const vi_structure *s, int k, bool receding);
+
+/* A receding contact meets its surface: it presses again, or, moving out too fast for that, has a surface from now on
+ * that follows it without force. */
+void vi_structure_return(const vi_structure *s, int k);
+
+/* A step begins: a contact begins where the force of another FMU's stop does, and not with a start that leaves the stop
+ * without force. */
+void vi_structure_meet_forces(const vi_structure *s);
+
+/* Does the surface of a receding compliant stop still lag behind, on its way back to rest? */
+bool vi_structure_surface_lags(const vi_structure *s, int k);
+
+/* Does contact k, which is free, meet its stop at this instant, as far as rounding can tell? */
+bool vi_structure_meets_now(const vi_structure *s, int k);
+
+/* Put contact k on its stop to the last bit. */
+void vi_structure_put_on_stop(const vi_structure *s, int k);
+
+#endif

@@ -1,0 +1,264 @@
+#include "body/modal/structure/drift.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "body/landing.h"
+#include "body/modal/entry_flow.h"
+#include "body/modal/forces.h"
+#include "body/modal/held.h"
+#include "body/modal/structure/contact.h"
+#include "body/modal/structure/extremes.h"
+#include "body/modal/structure/pressed.h"
+#include "body/modal/structure/thin.h"
+
+/* A power law is entered as a thin contact from this much of the depth of that thin contact. */
+static const double ENTRY = 1e-3;
+
+/* Or from so many roundings of the displacement: the series, whose steps are parts of the depth, would not move it. */
+static const double SHALLOW = 32.0;
+
+/* Of the square of the rate of a contact on its way out, what its force does over the way at most. */
+static const double COASTS = 1e-2;
+
+/* Does a contact on its way out keep its rate, whatever still presses it? */
+static bool coasts(const vi_structure *s, int k, double depth, double rate)
+{
+    const double force = vi_structure_yield(s, k).force;
+    return rate < 0.0 && force * s->model->compliance[k][k] * depth <= COASTS * rate * rate;
+}
+
+static void look(const vi_structure *s, vi_situation *now)
+{
+    now->any_thin = now->any_acceleration = false;
+    now->length = HUGE_VAL;
+    vi_structure_held_now(s, now->held);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        now->at[k] = -vi_structure_clearance(s, k);
+        now->sign[k] = vi_structure_direction(s, k);
+        now->press[k] = vi_structure_press(s, k);
+        now->thin[k] = 0;
+        if (now->press[k].kind == VI_PRESS_NONE && s->state->status[k] == VI_CONTACT_RECEDING
+            && vi_structure_surface_lags(s, k)) {
+            now->length = vi_min(now->length, s->contacts[k].relaxation_time);
+        }
+        now->kept[k] = s->state->status[k] == VI_CONTACT_YIELDING && vi_structure_is_kept(s, k);
+        if (now->kept[k]) { /* its force is what it is: rounding would move it, and set the pace */
+            now->press[k] = (vi_press){VI_PRESS_LINEAR, vi_structure_yield(s, k).force, 0.0, 0.0, 1.0};
+        }
+    }
+}
+
+/* Depth that is no more than rounding, of contact k. */
+static double shallow_depth(const vi_structure *s, int k)
+{
+    return SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+}
+
+/* Is a power law pressed in deeper than any thin contact, whose time is a radian at most? */
+static bool is_deep(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration)
+{
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
+    const double thickest = rate > 0.0 ? ENTRY * (rate + 0.5 * fabs(acceleration) * radian) * radian : -rate * radian;
+    return now->at[k] > thickest && now->at[k] > shallow_depth(s, k);
+}
+
+/* Is power law k thin? For how long at most? */
+static bool is_thin(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration,
+                    double *time)
+{
+    const double depth = vi_max(0.0, now->at[k]), shallow = shallow_depth(s, k);
+    *time = vi_thin_time(s, k, rate, now->acceleration, rate < 0.0 && depth > shallow ? -depth / rate : 0.0);
+    /* the way in: as far as its series would need steps much shorter than this one */
+    const double reached = (rate + 0.5 * vi_max(0.0, acceleration) * *time) * *time;
+    const double entered = vi_max(ENTRY * reached, shallow);
+    const double left = vi_max(-rate * *time, coasts(s, k, depth, rate) ? shallow : 0.0);
+    return rate <= 0.0 ? depth <= left || depth == 0.0 : depth <= entered;
+}
+
+static void look_at_power(const vi_structure *s, vi_situation *now, int k, double rate)
+{
+    double force[VI_PORTS], time;
+    if (!now->any_acceleration) {
+        vi_structure_accelerate(s, now->acceleration, force);
+        now->any_acceleration = true;
+    }
+    const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration) * vi_structure_direction(s, k);
+    if (!is_deep(s, now, k, rate, a) && is_thin(s, now, k, rate, a, &time)) {
+        now->thin[k] = 1;
+        now->any_thin = true;
+        now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
+        now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
+    }
+}
+
+/* Which power laws are thin, and how far the others' series may go. */
+static void look_at_powers(const vi_structure *s, vi_situation *now)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (now->press[k].kind == VI_PRESS_POWER) {
+            const double rate = vi_structure_approach(s, k);
+            if (rate > 0.0 || !is_deep(s, now, k, rate, 0.0)) {
+                look_at_power(s, now, k, rate);
+            }
+            if (rate < 0.0 && !now->thin[k]) {
+                /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
+                now->length = vi_min(now->length, -now->at[k] / rate);
+            }
+        }
+    }
+}
+
+/* The one contact that begins to press at this instant, by a power law, while all others are free and off their stops;
+ * -1: there is none. */
+static int entering(const vi_structure *s, const vi_situation *now)
+{
+    int found = -1;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_YIELDING && s->state->leaving[k] == 1
+            && now->press[k].kind == VI_PRESS_POWER && found < 0 && vi_structure_approach(s, k) > 0.0) {
+            found = k;
+        } else if (s->state->status[k] != VI_CONTACT_FREE
+                   || (vi_structure_watched(s, k)
+                       && -now->at[k] <= VI_ROUNDING * vi_structure_displacement_size(s, k))) {
+            return -1;
+        }
+    }
+    return s->model->coupled ? -1 : found;
+}
+
+/* Follow the beginning of a contact, where that goes further in than rounding. */
+static bool enter(const vi_structure *s, const vi_situation *now, const vi_drift_start *start, double length,
+                  vi_drift *drift)
+{
+    double depth[4];
+    const int k = entering(s, now);
+    if (k < 0 || !vi_entry_begin(drift, s->model, start, k, length)) {
+        return false;
+    }
+    vi_polynomial_at(drift->penetration[k], sqrt(drift->length), depth);
+    return depth[0] > shallow_depth(s, k);
+}
+
+/* ---- one segment ---- */
+
+static void add_impulses(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (now->thin[k]) {
+            vi_thin_impulse(s, k, now->at[k], drift->penetration[k][1], u);
+        } else if (s->state->status[k] == VI_CONTACT_YIELDING) {
+            s->state->touch_down[k].impulse += vi_drift_impulse(drift, k, u);
+        }
+    }
+}
+
+/* Kinetic and elastic energy of the modes, J. */
+static double energy_now(const vi_structure *s)
+{
+    double elastic = 0.0;
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        elastic += 0.5 * s->model->mode[j].stiffness * s->state->q[j] * s->state->q[j];
+    }
+    return vi_structure_kinetic(s) + elastic;
+}
+
+/* What is added at a segment's end, thin contacts' impulses and what holds the held ones against them, is energy that
+ * the stops have taken. */
+static void finish(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)
+{
+    const bool follow = now->any_thin && s->state->follow_energies;
+    const double before = follow ? energy_now(s) : 0.0;
+    add_impulses(s, drift, now, u);
+    vi_structure_project(s);
+    s->state->energies.contact_loss += follow ? before - energy_now(s) : 0.0;
+}
+
+static void follow_energies(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)
+{
+    int still[VI_PORTS] = {0};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        double moved[VI_ORDER + 1];
+        memcpy(moved, drift->penetration[k], sizeof moved);
+        moved[0] = 0.0;
+        still[k] = s->state->status[k] == VI_CONTACT_YIELDING
+                   && vi_structure_stays(s, drift, k, moved, vi_drift_variable(drift, u));
+    }
+    vi_energies_of_drift(s, drift, now->held, still, u);
+}
+
+/* Nothing moves and nothing will: a body at rest on a stop under constant loads. */
+static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const vi_situation *now)
+{
+    const vi_structure_model *model = s->model;
+    if (s->record->periods) {
+        return false;
+    }
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const bool forced = mode->force != 0.0 && model->clock.angular_frequency > 0.0;
+        const double load = fabs(now->held[j]) + fabs(mode->force) + mode->stiffness * fabs(s->state->q[j]);
+        if (forced || s->state->held_rate[j] != 0.0 || s->state->p[j] != 0.0
+            || fabs(2.0 * drift->modal[2][j]) > VI_ROUNDING * load) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* What a drift costs, in evaluations of a mode. */
+static int64_t drift_evaluations(const vi_structure_model *model)
+{
+    const int64_t modes = vi_structure_modes(model);
+    return VI_ORDER * modes + (model->coupled ? modes * modes / 2 : 0);
+}
+
+double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k)
+{
+    vi_structure_state *state = s->state;
+    const double rested = vi_structure_rest_on(s, length, room);
+    if (rested > 0.0) {
+        *event = VI_DRIFT_NO_EVENT;
+        *k = -1;
+        return rested;
+    }
+    const vi_phase phase = vi_structure_phase(s);
+    vi_situation now;
+    vi_drift drift;
+    state->series += 1;
+    look(s, &now);
+    vi_budget_spend(&state->budget, drift_evaluations(s->model));
+    const vi_drift_start start = {state->q,   state->p, phase.cosine, phase.sine, now.held, state->held_rate,
+                                  now.at, now.sign, now.press};
+    if (!enter(s, &now, &start, length + room, &drift)) {
+        look_at_powers(s, &now);
+        vi_drift_begin(&drift, s->model, &start, vi_min(length + room, now.length));
+    }
+    const bool to_end = drift.length >= length;
+    const double reach = to_end ? length : drift.length;
+    const vi_event_found first = vi_structure_first_event(s, &drift, &now, reach, vi_max(reach, drift.length));
+    *event = first.event;
+    *k = first.contact;
+    const double u = first.time;
+    if (first.event == VI_DRIFT_NO_EVENT && at_rest_for_good(s, &drift, &now)) {
+        return length;
+    }
+    if (s->record->extrema) {
+        vi_extremes_of_drift(s, &drift, u);
+    }
+    if (state->follow_energies) {
+        follow_energies(s, &drift, &now, u);
+    }
+    if (s->record->impacts) {
+        vi_peaks_of_drift(s, &drift, u);
+    }
+    double q[VI_MODES];
+    memcpy(q, state->q, sizeof q);
+    vi_drift_at(&drift, u, q, state->p, state->q);
+    finish(s, &drift, &now, u);
+    if (state->follow_energies) {
+        vi_energies_of_rounding(s, &drift, q, now.held, u);
+    }
+    return u;
+}

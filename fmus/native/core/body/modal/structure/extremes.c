@@ -1,0 +1,247 @@
+#include "body/modal/structure/extremes.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "body/landing.h"
+#include "motion/majorant.h"
+
+/* Nodes and weights of Gauss-Legendre quadrature with eight points, for -1 to 1 (the other half by symmetry). */
+static const double NODES[4] = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
+                                0.96028985649753623168};
+static const double WEIGHTS[4] = {0.36268378337836198297, 0.31370664587788728734, 0.22238103445337447054,
+                                  0.10122853629037625915};
+/* Length of a piece of quadrature times the fastest rate: eight points then integrate to the last digits. */
+static const double PIECE = 1.5;
+
+/* Pieces of a segment of drift, which may be 5 over the fastest rate. */
+enum { DRIFT_PIECES = 4 };
+
+/* Turns of a polynomial over one segment. */
+enum { MOST_TURNS = 16 };
+
+/* Evaluations that a climb is counted as. */
+enum { CLIMB = 8 };
+
+/* ---- extremes ---- */
+
+static void extend(const vi_structure *s, double displacement)
+{
+    vi_record_extend(s->record, vi_structure_within(s, displacement));
+}
+
+/* Climb from u to the next turning point of the observed displacement times sign; returns its time. */
+static double climb(const vi_flight *flight, const vi_point *point, double u, double end, double *top)
+{
+    vi_flight_instant now;
+    for (int evaluation = 0;; ++evaluation) {
+        vi_flight_at(flight, u, &now);
+        const vi_approach p = vi_point_approach(point, flight, &now);
+        *top = p.clearance; /* of a stop above: falls as the point rises */
+        const double noise = 4.0 * DBL_EPSILON * (fabs(p.velocity) + point->scale * flight->model->fastest);
+        if (!(p.velocity > noise) || u >= end) {
+            return u;
+        }
+        /* the velocity falls to zero as a clearance does */
+        const vi_approach fall = {p.velocity, -p.acceleration, -p.jerk, p.bound, 0.0};
+        u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), vi_least_step(end, 1e-12, evaluation)));
+    }
+}
+
+/* Largest displacement * sign over the flight: regions that stay below the largest one seen are passed over. */
+static void extreme(const vi_structure *s, const vi_flight *flight, double sign, double end)
+{
+    vi_flight_instant now;
+    vi_point point;
+    const double here = vi_structure_observed(s);
+    double best = s->record->displacement_max, u = 0.0;
+    if (sign < 0.0) {
+        best = -s->record->displacement_min;
+    }
+    best = vi_max(best, sign * here);
+    vi_point_start(&point, flight, s->model->observed, sign, best - sign * here);
+    const double start = point.offset, least = VI_ROUNDING * point.scale;
+    for (int evaluation = 0; u < end; ++evaluation) {
+        const double least_step = vi_least_step(end, 1e-9, evaluation);
+        vi_budget_spend(&s->state->budget, vi_structure_modes(s->model));
+        vi_flight_at(flight, u, &now);
+        const vi_approach p = vi_point_approach(&point, flight, &now);
+        if (p.clearance <= least && p.velocity > 0.0) {
+            double top;
+            u = climb(flight, &point, u, end, &top);
+            vi_budget_spend(&s->state->budget, CLIMB * vi_structure_modes(s->model));
+            point.offset += vi_max(0.0, -top); /* the bar is raised to what was reached */
+            u += least_step;
+            continue;
+        }
+        point.offset += least;
+        u += vi_max(vi_point_step(&point, flight, &now, end - u), least_step);
+        point.offset -= least;
+    }
+    vi_flight_at(flight, end, &now);
+    point.offset += vi_max(0.0, -vi_point_approach(&point, flight, &now).clearance);
+    extend(s, sign * (best + (point.offset - start)));
+}
+
+void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u)
+{
+    vi_record_extend(s->record, vi_structure_observed(s));
+    if (u > 0.0) {
+        extreme(s, flight, 1.0, u);
+        extreme(s, flight, -1.0, u);
+    }
+}
+
+static void differentiate(const double c[VI_ORDER + 1], double sign, double slope[VI_ORDER + 1])
+{
+    for (int n = 0; n < VI_ORDER; ++n) {
+        slope[n] = sign * (double)(n + 1) * c[n + 1];
+    }
+    slope[VI_ORDER] = 0.0;
+}
+
+/* Where a polynomial turns round next after `from`; HUGE_VAL where it does not up to the end. */
+static double next_turn(const double polynomial[VI_ORDER + 1], double from, double end)
+{
+    double slope[VI_ORDER + 1], value[4];
+    vi_polynomial_at(polynomial, from, value);
+    const double sign = value[1] != 0.0 ? copysign(1.0, value[1]) : copysign(1.0, value[2]);
+    differentiate(polynomial, sign, slope);
+    const vi_fall fall = vi_polynomial_fall(slope, from, end, 4.0 * DBL_EPSILON * vi_polynomial_size(slope, end));
+    return fall.found ? fall.time : HUGE_VAL;
+}
+
+void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u)
+{
+    double polynomial[VI_ORDER + 1], value[4], from = 0.0;
+    const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
+    const double end = vi_drift_variable(drift, u);
+    vi_drift_point(drift, s->model->observed, polynomial);
+    extend(s, here);
+    vi_polynomial_at(polynomial, end, value);
+    extend(s, here + value[0]);
+    if (vi_polynomial_size(polynomial, end) <= VI_ROUNDING * fabs(here)) {
+        return; /* it is held: what its polynomial says is rounding */
+    }
+    for (int turn = 0; turn < MOST_TURNS && from < end; ++turn) {
+        const double at = next_turn(polynomial, from, end);
+        if (!(at < HUGE_VAL)) {
+            return;
+        }
+        vi_polynomial_at(polynomial, at, value);
+        extend(s, here + value[0]);
+        from = at + 1e-3 * end;
+    }
+}
+
+/* ---- largest forces ---- */
+
+/* The largest value of a polynomial from 0 to the end. */
+static double largest_value(const double polynomial[VI_ORDER + 1], double end)
+{
+    double value[4], from = 0.0;
+    vi_polynomial_at(polynomial, end, value);
+    double largest = vi_max(polynomial[0], value[0]);
+    for (int turn = 0; turn < MOST_TURNS && from < end; ++turn) {
+        const double at = next_turn(polynomial, from, end);
+        if (!(at < HUGE_VAL)) {
+            return largest;
+        }
+        vi_polynomial_at(polynomial, at, value);
+        largest = vi_max(largest, value[0]);
+        from = at + 1e-3 * end;
+    }
+    return largest;
+}
+
+void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (vi_structure_follows_peak(s, k)) {
+            const double largest = largest_value(drift->force[k], vi_drift_variable(drift, u));
+            s->state->touch_down[k].peak = vi_max(s->state->touch_down[k].peak, largest);
+        }
+    }
+}
+
+/* ---- energies ---- */
+
+/* Power of the applied forces and of the damping at modal velocities p, the forcing phase being `angle`. */
+static void add_powers(const vi_structure *s, const double p[], const double held[], double u, double angle,
+                       double weight)
+{
+    const vi_structure_model *model = s->model;
+    const double cosine = cos(angle);
+    double work = 0.0, loss = 0.0;
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        const vi_mode *mode = &model->mode[j];
+        work += (mode->force * cosine + held[j] + s->state->held_rate[j] * u) * p[j];
+        loss += p[j] * (model->coupled ? vi_structure_at(model, model->coupling[j], p) : 2.0 * mode->decay * p[j]);
+    }
+    s->state->energies.forcing_work += weight * work;
+    s->state->energies.damping_loss += weight * loss;
+}
+
+/* The i-th of the eight nodes of a piece from `start`, and its weight. */
+static double node(double start, double piece, int i, double *weight)
+{
+    const double middle = start + 0.5 * piece, half = 0.5 * piece;
+    *weight = half * WEIGHTS[i % 4];
+    return i < 4 ? middle - half * NODES[i] : middle + half * NODES[i % 4];
+}
+
+double vi_energies_reach(const vi_structure *s)
+{
+    return s->state->follow_energies ? VI_MOST_EVALUATIONS / 8 * PIECE / s->model->fastest : HUGE_VAL;
+}
+
+void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u)
+{
+    const double count = ceil(vi_max(1.0, u * s->model->fastest / PIECE)), piece = u / count;
+    double q[VI_MODES], p[VI_MODES], weight;
+    vi_budget_spend(&s->state->budget, (int64_t)(8.0 * count) * vi_structure_modes(s->model));
+    for (double n = 0.0; n < count; n += 1.0) {
+        for (int i = 0; i < 8; ++i) {
+            const double t = node(n * piece, piece, i, &weight), angle = flight->phase.angle + flight->angular_frequency * t;
+            vi_flight_end(flight, t, angle, q, p);
+            add_powers(s, p, held, t, angle, weight);
+        }
+    }
+}
+
+void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
+                          double u)
+{
+    const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
+    const double piece = vi_drift_variable(drift, u) / (double)DRIFT_PIECES;
+    double q[VI_MODES], p[VI_MODES], weight, value[4];
+    for (int i = 0; i < 8 * DRIFT_PIECES; ++i) {
+        const double r = node((double)(i / 8) * piece, piece, i % 8, &weight), t = drift->rooted ? r * r : r;
+        const double slope = drift->rooted ? 2.0 * r : 1.0; /* of t over r */
+        vi_drift_at(drift, t, s->state->q, p, q);
+        add_powers(s, p, held, t, angle + w * t, slope * weight);
+        for (int k = 0; k < s->model->contacts; ++k) {
+            if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
+                vi_polynomial_at(drift->force[k], r, value);
+                const double force = value[0];
+                vi_polynomial_at(drift->penetration[k], r, value);
+                s->state->energies.contact_loss += weight * force * value[1];
+            }
+        }
+    }
+}
+
+void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const double q[], const double held[],
+                             double u)
+{
+    const double cosine = cos(s->model->clock.angular_frequency * (s->state->now.rest + u)), zero[VI_MODES] = {0.0};
+    double moved[VI_MODES], p[VI_MODES], work = 0.0, way = 0.0, undone = 0.0;
+    vi_drift_at(drift, u, zero, p, moved);
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        const double back = q[j] + moved[j] - s->state->q[j];
+        work += (s->model->mode[j].force * cosine + held[j] + s->state->held_rate[j] * u) * back;
+        way += fabs(moved[j]);
+        undone += fabs(back);
+    }
+    s->state->energies.forcing_work -= undone > 0.5 * way ? work : 0.0;
+}

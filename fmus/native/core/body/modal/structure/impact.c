@@ -1,0 +1,347 @@
+#include "body/modal/structure/impact.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "body/chatter.h"
+#include "body/contact_events.h"
+#include "body/landing.h"
+#include "body/modal/forces.h"
+#include "body/modal/held.h"
+#include "body/modal/structure/contact.h"
+#include "contact/complementarity.h"
+#include "motion/majorant.h"
+
+/* A joint impact may set off others at the same instant; each round loses energy or ends, but between stops that leave
+ * no room it would go on for ever. */
+static const int MOST_ROUNDS = 64;
+
+/* Height of a bounce, relative to the motion, that any integrator can follow. */
+static const double HIGHEST_UNRESOLVED = 1e-4;
+
+static double restitution_of(const vi_structure *s, int k, double approach)
+{
+    const vi_contact *contact = &s->contacts[k];
+    const bool asked = s->model->asks && vi_contact_law_is_external(contact->law.law);
+    return asked ? contact->applied_restitution : vi_contact_law_restitution(&contact->law, approach);
+}
+
+static double drag_at(const vi_structure *s, int k)
+{
+    const vi_structure_model *model = s->model;
+    double drag = 0.0;
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        const double pulled = model->coupled ? vi_structure_at(model, model->coupling[j], model->impulse[k])
+                                             : 2.0 * model->mode[j].decay * model->impulse[k][j];
+        drag += model->shape[k][j] * pulled;
+    }
+    return drag / model->mobility[k][k];
+}
+
+/* Size of displacements that double precision cannot tell apart at a contact, m. */
+static double resolution(const vi_structure *s, int k, double pressure, double approach)
+{
+    const bool low = vi_chatter_is_low(pressure, approach, s->model->fastest);
+    return DBL_EPSILON * (low ? fabs(s->contacts[k].position) : vi_structure_displacement_size(s, k));
+}
+
+/* Height of a bounce that can be told from none: by rounding, or by the integrator of model exchange. */
+static double bounce_resolution(const vi_structure *s, int k, double pressure, double rebound)
+{
+    const double integrated = s->state->exchange.unresolved * sqrt(s->model->compliance[k][k]);
+    return vi_max(integrated, resolution(s, k, pressure, rebound));
+}
+
+/* The plastic impact that stands for the rest of a chatter sequence, or for a stop without rebound. */
+static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view, double delay, double tail_impulse)
+{
+    const double before = s->state->follow_energies ? vi_structure_kinetic(s) : 0.0;
+    memcpy(s->state->p, view->p, sizeof view->p);
+    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+    vi_structure_rest(s, k, delay, tail_impulse);
+}
+
+/* Rest on stop k now if the bounces still to come can be summed (or are too low, or too many, to be followed). */
+static void rest_if_summable(const vi_structure *s, int k, double rebound, double restitution, bool tiny)
+{
+    vi_held_view view;
+    vi_structure_look_at_held(s, k, &view);
+    if (rebound == 0.0 && view.lead >= 0.0 && fabs(view.pressure) <= view.noise) {
+        come_to_rest(s, k, &view, 0.0, 0.0); /* neither pressed nor lifted */
+        return;
+    }
+    if (!(view.pressure > 0.0)) {
+        return;
+    }
+    const vi_bounces b = {.rebound = rebound,
+                          .restitution = restitution,
+                          .pressure = view.pressure,
+                          .slope = view.slope,
+                          .bend = view.bend,
+                          .drag = drag_at(s, k),
+                          .fastest = s->model->fastest,
+                          .moving = s->model->fastest,
+                          .resolution = bounce_resolution(s, k, view.pressure, rebound),
+                          .tiny = tiny};
+    const vi_chatter chatter = vi_chatter_look(&b, s->state->low_impacts[k]);
+    if (chatter.rests) {
+        const double impulse = (1.0 + restitution) * rebound / (view.mobility * (1.0 - restitution));
+        come_to_rest(s, k, &view, chatter.duration, chatter.summed ? impulse : 0.0);
+    }
+}
+
+/* Speed at which contact k leaves after the impulses: that of its law, or more where others have thrown it off. */
+static double rebound_of(const vi_structure *s, int k, double approach, double impulse, double restitution)
+{
+    const double own = restitution * approach, speed = -vi_structure_approach(s, k);
+    const bool thrown = !(impulse > 0.0) && speed > own + VI_ROUNDING * vi_structure_velocity_size(s, k);
+    return thrown ? speed : own;
+}
+
+void vi_structure_end_bounce(const vi_structure *s, int k)
+{
+    vi_exchange *exchange = &s->state->exchange;
+    const double rebound = -vi_structure_approach(s, k);
+    vi_held_view view;
+    vi_structure_look_at_held(s, k, &view);
+    if (!(rebound > 0.0 && view.pressure > 0.0)) {
+        return;
+    }
+    const double height = 0.5 * rebound * rebound / (view.pressure * sqrt(s->model->compliance[k][k]));
+    exchange->unresolved = vi_min(vi_max(exchange->unresolved, height), HIGHEST_UNRESOLVED * exchange->displacement);
+    rest_if_summable(s, k, rebound, restitution_of(s, k, rebound), false);
+}
+
+static bool is_tiny(double acceleration, double rebound, double fastest, double height)
+{
+    return acceleration > 0.0 && (!(rebound * rebound > 2.0 * acceleration * height)
+                                  || 2.0 * rebound * fastest <= VI_SHORT_FLIGHT * acceleration);
+}
+
+/* One contact after the impulses: count it, and let it rest where its chatter can be summed. */
+static void after_impact(const vi_structure *s, int k, double approach, double impulse, double restitution)
+{
+    vi_structure_state *state = s->state;
+    const double rebound = rebound_of(s, k, approach, impulse, restitution), fastest = s->model->fastest;
+    const double size = vi_structure_displacement_size(s, k), height = VI_LOW_HEIGHT * size;
+    const double most = vi_structure_most_acceleration(s, k);
+    bool graze = false, tiny = false;
+    if (!(approach * approach > 2.0 * most * (DBL_EPSILON * size)) || is_tiny(most, rebound, fastest, height)) {
+        double acceleration[VI_MODES], force[VI_PORTS];
+        vi_structure_accelerate(s, acceleration, force);
+        const double a = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
+        graze = vi_chatter_is_graze(approach, a, resolution(s, k, a, approach));
+        tiny = is_tiny(a, rebound, fastest, height);
+    }
+    state->budget.events += 1;
+    if (graze) {
+        s->contacts[k].graze_count += 1;
+    } else {
+        vi_contact_hit(&s->contacts[k], s->record, &s->model->clock, state->now, k + 1, approach, impulse, restitution);
+    }
+    state->status[k] = VI_CONTACT_TOUCHING;
+    state->leaving[k] = rebound == 0.0 ? 1 : 0;
+    const bool counted =
+        vi_chatter_count(&state->fastest_impact[k], &state->low_impacts[k], approach, rebound, graze, tiny);
+    if (counted || state->exchange.on) { /* an integrator cannot follow bounces below its tolerance, however few */
+        rest_if_summable(s, k, rebound, restitution, tiny);
+    }
+}
+
+/* To the modes, rounded once: what is less than a rounding of the impulse still decides how a velocity is rounded. */
+static void give_impulses(const vi_structure *s, const double impulse[], const double low[])
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const double sign = vi_structure_direction(s, k), push = -sign * impulse[k], push_low = -sign * low[k];
+        for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
+            const double gain = s->model->impulse[k][j], step = gain * push, before = s->state->p[j];
+            const double sum = before + step, part = sum - before;
+            const double rounding = (before - (sum - part)) + (step - part);
+            s->state->p[j] = sum + (rounding + (fma(gain, push, -step) + gain * push_low));
+        }
+    }
+}
+
+/* What rounding has taken from the impulses p > 0 of g p = b, g given to twice its digits. */
+static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_PORTS], const double b[],
+                   const double p[], double more[])
+{
+    double left[VI_PORTS] = {0.0};
+    int active[VI_PORTS] = {0};
+    for (int i = 0; i < n; ++i) {
+        double sum = b[i], rounding = 0.0;
+        active[i] = p[i] > 0.0;
+        for (int j = 0; j < n; ++j) {
+            const double product = -g[i][j] * p[j], total = sum + product, part = total - sum;
+            rounding += fma(-g[i][j], p[j], -product) + ((sum - (total - part)) + (product - part)) - low[i][j] * p[j];
+            sum = total;
+        }
+        left[i] = sum + rounding;
+    }
+    vi_solve_active(n, g, left, active, more);
+}
+
+/* The impulse of a contact that is alone in play. */
+static void own_impulse(const vi_structure *s, int k, double wanted, double *impulse, double *impulse_low)
+{
+    const double g = s->model->mobility[k][k], p = wanted / g;
+    *impulse = p;
+    *impulse_low = (fma(-g, p, wanted) - s->model->mobility_low[k][k] * p) / g;
+}
+
+/* Solve for the impulses of the contacts in play; the others are out of the problem. */
+static void joint_impulses(const vi_structure *s, const int in_play[], const double wanted[], double impulse[],
+                           double impulse_low[])
+{
+    double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
+    double b[VI_PORTS], p[VI_PORTS], more[VI_PORTS];
+    int index[VI_PORTS], count = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        impulse[k] = impulse_low[k] = 0.0;
+        if (in_play[k]) {
+            index[count++] = k;
+        }
+    }
+    if (count == 1 && s->model->mobility[index[0]][index[0]] > 0.0) {
+        const int k = index[0];
+        own_impulse(s, k, wanted[k], &impulse[k], &impulse_low[k]);
+        return;
+    }
+    vi_structure_signed(s, s->model->mobility, whole);
+    vi_structure_signed(s, s->model->mobility_low, whole_low);
+    for (int i = 0; i < count; ++i) {
+        b[i] = wanted[index[i]];
+        for (int j = 0; j < count; ++j) {
+            g[i][j] = whole[index[i]][index[j]];
+            low[i][j] = whole_low[index[i]][index[j]];
+        }
+    }
+    vi_complementary(count, g, b, p);
+    refine(count, g, low, b, p, more);
+    for (int i = 0; i < count; ++i) {
+        impulse[index[i]] = p[i];
+        impulse_low[index[i]] = more[i];
+    }
+}
+
+/* One round: every contact that is hit asks for its rebound; those at rest on a stop only may not be pushed in. */
+static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
+{
+    vi_structure_state *state = s->state;
+    const int n = s->model->contacts;
+    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, wanted[VI_PORTS] = {0.0};
+    double impulse[VI_PORTS], impulse_low[VI_PORTS];
+    int in_play[VI_PORTS] = {0};
+    const double before = vi_structure_kinetic(s);
+    for (int k = 0; k < n; ++k) {
+        const bool resting = state->status[k] == VI_CONTACT_HELD
+                             || (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]);
+        in_play[k] = hit[k] || resting;
+        if (hit[k]) {
+            approach[k] = vi_max(0.0, vi_structure_approach(s, k));
+            restitution[k] = restitution_of(s, k, approach[k]);
+            wanted[k] = (1.0 + restitution[k]) * approach[k];
+        }
+    }
+    joint_impulses(s, in_play, wanted, impulse, impulse_low);
+    give_impulses(s, impulse, impulse_low);
+    state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+    for (int k = 0; k < n; ++k) {
+        s->contacts[k].total_impulse += in_play[k] && !hit[k] ? impulse[k] : 0.0;
+        if (in_play[k] && !hit[k] && state->leaving[k] > 1) {
+            state->leaving[k] = 1; /* its acceleration may be another now */
+        }
+        if (in_play[k] && !hit[k] && !(impulse[k] > 0.0)
+            && vi_structure_approach(s, k) < -VI_ROUNDING * vi_structure_velocity_size(s, k)) {
+            if (state->status[k] == VI_CONTACT_HELD) {
+                vi_structure_release(s, k, 0);
+            }
+            state->leaving[k] = 0;
+        }
+    }
+    for (int k = 0; k < n; ++k) {
+        if (hit[k]) {
+            after_impact(s, k, approach[k], impulse[k], restitution[k]);
+        }
+    }
+}
+
+/* A body between stops that leave it no room: whatever touches comes to rest. */
+static void wedge(const vi_structure *s)
+{
+    double g[VI_PORTS][VI_PORTS], approach[VI_PORTS], impulse[VI_PORTS];
+    int touches[VI_PORTS] = {0};
+    const double before = vi_structure_kinetic(s);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int32_t status = s->state->status[k];
+        touches[k] = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
+        approach[k] = vi_structure_approach(s, k);
+    }
+    vi_structure_signed(s, s->model->compliance, g);
+    vi_solve_active(s->model->contacts, g, approach, touches, impulse);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_structure_push(s, k, impulse[k], s->state->p);
+        s->contacts[k].total_impulse += impulse[k];
+    }
+    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+}
+
+void vi_structure_take_impulses(const vi_structure *s)
+{
+    vi_structure_state *state = s->state;
+    double impulse[VI_PORTS], low[VI_PORTS] = {0.0};
+    bool any = false;
+    if (state->pending) {
+        return; /* an impact comes first */
+    }
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact *contact = &s->contacts[k];
+        impulse[k] = -vi_structure_direction(s, k) * contact->applied_impulse;
+        if (contact->applied_impulse != 0.0) {
+            any = true;
+            vi_contact_struck(contact, vi_clock_time(&s->model->clock, state->now));
+        }
+    }
+    if (!any) {
+        return;
+    }
+    give_impulses(s, impulse, low);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (state->status[k] == VI_CONTACT_HELD) {
+            vi_structure_release(s, k, 0);
+        }
+    }
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (state->status[k] == VI_CONTACT_TOUCHING) {
+            state->leaving[k] = 0;
+        }
+    }
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        state->origin[j].known = 0;
+    }
+}
+
+void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
+{
+    int now[VI_PORTS];
+    memcpy(now, hit, sizeof now);
+    for (int round = 0; round < MOST_ROUNDS; ++round) {
+        collide_once(s, now);
+        int any = 0;
+        for (int k = 0; k < s->model->contacts; ++k) {
+            const bool rigid = s->model->stop[k] == VI_RIGID_STOP && !vi_contact_law_is_external(s->contacts[k].law.law);
+            if (rigid && vi_structure_meets_now(s, k)) { /* thrown against it by the last round, in a corner */
+                s->state->status[k] = VI_CONTACT_TOUCHING;
+                s->state->leaving[k] = 0;
+            }
+            const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k] && rigid;
+            now[k] = touches && vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k);
+            any |= now[k];
+        }
+        if (!any) {
+            return;
+        }
+    }
+    wedge(s);
+}
