@@ -53,12 +53,15 @@ static size_t used_size(const void *self)
     return offsetof(thing, rows) + (size_t)((const thing *)self)->used * sizeof(double);
 }
 
-const vi_component vi_this_component = {
-    .name = "Thing",
+const vi_description vi_this_description = {
     .token = "{token}",
+    .struct_size = sizeof(thing),
+    .time = offsetof(thing, time),
     .variables = thing_variables,
     .variable_count = VARIABLES,
-    .struct_size = sizeof(thing),
+};
+
+const vi_component vi_this_component = {
     .defaults = defaults,
     .initialize = initialize,
     .was_set = was_set,

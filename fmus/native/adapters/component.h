@@ -1,8 +1,8 @@
 /* What a component (Oscillator, ImpactStop, ...) gives to the FMI adapters.
  *
- * All variables of a component live in one flat struct; the generated table `<folder>_variables`
- * says where. So get and set are table look-ups, and saving a state is a memcpy. The adapters
- * fmi2.c and fmi3.c are compiled once for each component and know nothing of its physics.
+ * All variables of a component live in one flat struct; `vi_this_description`, which the build generates from
+ * variables.toml, says where. So get and set are table look-ups, and saving a state is a memcpy. The adapters fmi2.c and
+ * fmi3.c are compiled once for each component and know nothing of its physics.
  */
 #ifndef VIBROIMPACT_COMPONENT_H
 #define VIBROIMPACT_COMPONENT_H
@@ -25,6 +25,18 @@ typedef struct {
     uint32_t count; /* number of elements: 1, or the product of the dimensions */
     uint32_t offset; /* in the component's struct, bytes */
 } vi_variable;
+
+/* A component as its model description shows it. */
+typedef struct {
+    const char *token;
+    size_t struct_size;
+    size_t time; /* offset of the present time in the struct, bytes */
+    const vi_variable *variables;
+    size_t variable_count;
+    /* References of the continuous states: all displacements, then all velocities; NULL where there are none. */
+    const uint32_t *states;
+    size_t state_count;
+} vi_description;
 
 /* What a component gives to an importer that integrates it (model exchange). Between events its derivatives and its
  * indicators are smooth; all that jumps does so in `handle_event`. */
@@ -51,37 +63,30 @@ typedef struct {
     void (*go_on)(void *self);
 } vi_model_exchange;
 
-/* A component. Each of its functions works on the flat struct `self` and never allocates. */
+/* A component. Each of its functions works on the flat struct `self` and never allocates; a `message` is empty when it is
+ * called. */
 typedef struct {
-    const char *name;
-    const char *token;
-    const vi_variable *variables;
-    size_t variable_count;
-    /* References of the continuous states: all displacements, then all velocities; NULL where there are none. */
-    const uint32_t *states;
-    size_t state_count;
-    size_t struct_size;
-
     /* Fill `self` (zeroed) with the default values. */
     void (*defaults)(void *self);
-    /* Check all parameters and start. On failure write every problem into `message` and return false; on success it is
-     * empty or holds a warning. */
+    /* Check all parameters, start, compute the outputs. On failure write every problem into `message` and return false; on
+     * success it is empty or holds a warning. */
     bool (*initialize)(void *self, double start_time, char message[VI_MESSAGE_LENGTH]);
-    /* The variable with this value reference was set. */
+    /* The variable with this value reference was set; NULL: nothing follows from it but the outputs. */
     void (*was_set)(void *self, uint32_t value_reference);
     /* Recompute the outputs that depend on inputs directly. */
     void (*update_outputs)(void *self);
     /* Advance to the end of the step; see step.h. */
     vi_step_result (*step)(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH]);
-    /* Resolve what is pending in event mode (FMI 3.0) or at the start of a step (FMI 2.0). */
+    /* For a component that raises events; else these two are NULL. Resolve what is pending in event mode (FMI 3.0) or at the
+     * start of a step (FMI 2.0). */
     bool (*resolve)(void *self, char message[VI_MESSAGE_LENGTH]);
     /* Is the component asking for an event at its present instant? */
     bool (*event_pending)(const void *self);
-    /* Does this set-up need event mode (an external contact law)? */
+    /* Does this set-up need event mode (an external contact law)? NULL: no set-up does. */
     bool (*needs_events)(const void *self);
-    /* Present time, s. */
+    /* Present time, s; NULL: the variable `time` holds it. */
     double (*time)(const void *self);
-    /* Bytes of `self` in use, so that a saved state holds no unused rows of the record. */
+    /* Bytes of `self` in use, so that a saved state holds no unused rows of the record; NULL: all of it. */
     size_t (*used_size)(const void *self);
     /* The model description has `count` of the repeated variables `block` ("modes", "contacts"); called after
      * `defaults`. NULL for a component to which this makes no difference. */
@@ -101,5 +106,6 @@ typedef struct {
 
 /* The one component that this shared library holds. */
 extern const vi_component vi_this_component;
+extern const vi_description vi_this_description;
 
 #endif

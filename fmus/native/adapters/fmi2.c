@@ -176,18 +176,18 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
         return fmi2Error;
     }
     const vi_step_request request = {currentCommunicationPoint, communicationStepSize, false, false};
-    const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
+    const vi_step_result result = vi_instance_step(it, &request);
     if (vi_step_failed(result)) {
         return status(vi_instance_fail(it, function, "%s", it->message));
     }
     it->outputs_stale = false;
     if (result == VI_STEP_IMPACT_LIMIT) {
         return status(vi_instance_fail(it, function, "impact_limit reached at %.17g s; expected fewer impacts",
-                                       vi_this_component.time(it->self)));
+                                       vi_instance_time(it)));
     }
     if (result == VI_STEP_UNFINISHED) {
         return status(vi_instance_fail(it, function, "expected a step whose end can be computed in a minute or so, got as"
-                                       " far as %.17g s. Ask for shorter steps", vi_this_component.time(it->self)));
+                                       " far as %.17g s. Ask for shorter steps", vi_instance_time(it)));
     }
     return fmi2OK;
 }
@@ -213,7 +213,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
     if (it == NULL || value == NULL || s != fmi2LastSuccessfulTime || ((int)it->mode & VI_RUNNING) == 0) {
         return unavailable(c, "fmi2GetRealStatus");
     }
-    *value = vi_this_component.time(it->self);
+    *value = vi_instance_time(it);
     return fmi2OK;
 }
 

@@ -172,7 +172,8 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 /* A law that another FMU answers needs an importer that stops at events. */
 static bool events_are_handled(vi_instance *it, const char *function)
 {
-    if (it->exchange || !vi_this_component.needs_events(it->self) || (it->event_mode_used && it->early_return_allowed)) {
+    const bool needed = vi_this_component.needs_events != NULL && vi_this_component.needs_events(it->self);
+    if (it->exchange || !needed || (it->event_mode_used && it->early_return_allowed)) {
         return true;
     }
     return vi_instance_fail(it, function,
@@ -255,13 +256,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                                      it->early_return_allowed};
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
     *lastSuccessfulTime = currentCommunicationPoint;
-    const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
+    const vi_step_result result = vi_instance_step(it, &request);
     if (vi_step_failed(result)) {
         return status(vi_instance_fail(it, "fmi3DoStep", "%s", it->message));
     }
     it->outputs_stale = false;
     const double end = currentCommunicationPoint + communicationStepSize;
-    const double reached = vi_this_component.time(it->self); /* a contact may lie within rounding after the end */
+    const double reached = vi_instance_time(it); /* a contact may lie within rounding after the end */
     *lastSuccessfulTime = result == VI_STEP_DONE || reached > end ? end : reached;
     if (result == VI_STEP_IMPACT_LIMIT) {
         log_message(it, fmi3Discard, "logStatusWarning", "fmi3DoStep: impact_limit reached");
@@ -296,8 +297,10 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     if (it->exchange) {
         return status(vi_instance_handle_event(it, function, valuesOfContinuousStatesChanged, terminateSimulation));
     }
-    *valuesOfContinuousStatesChanged = vi_this_component.event_pending(it->self);
-    if (!vi_this_component.resolve(it->self, it->message)) {
+    const bool has_events = vi_this_component.resolve != NULL;
+    *valuesOfContinuousStatesChanged = has_events && vi_this_component.event_pending(it->self);
+    it->message[0] = '\0';
+    if (has_events && !vi_this_component.resolve(it->self, it->message)) {
         return status(vi_instance_fail(it, function, "%s", it->message));
     }
     it->outputs_stale = true;

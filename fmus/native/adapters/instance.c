@@ -9,6 +9,7 @@
 #include "sizes.h"
 
 static const vi_component *const component = &vi_this_component;
+static const vi_description *const description = &vi_this_description;
 
 /* Largest amount by which a step may pass the stop time: the rounding of an importer's sums, relative to 1 + |time|. */
 #define STOP_ROUNDING 1e-9
@@ -21,20 +22,20 @@ enum { MOST_STATES = 2 * VI_MODES };
 bool vi_token_fits(const char *token)
 {
     static const char own[] = "000000000000}"; /* as many characters as are an export's own */
-    const size_t length = strlen(component->token);
+    const size_t length = strlen(description->token);
     return token != NULL && strlen(token) == length && length >= sizeof own - 1
-           && strncmp(token, component->token, length - (sizeof own - 1)) == 0;
+           && strncmp(token, description->token, length - (sizeof own - 1)) == 0;
 }
 
 bool vi_token_is_of_export(const char *token)
 {
-    return strcmp(token, component->token) != 0;
+    return strcmp(token, description->token) != 0;
 }
 
 vi_instance *vi_instance_new(const char *name)
 {
     vi_instance *instance = calloc(1, sizeof(vi_instance));
-    void *self = calloc(1, component->struct_size);
+    void *self = calloc(1, description->struct_size);
     const size_t length = strlen(name) + 1;
     char *copy = malloc(length);
     if (instance == NULL || self == NULL || copy == NULL) {
@@ -64,11 +65,18 @@ void vi_instance_free(vi_instance *instance)
     }
 }
 
+static void announce(vi_instance *instance, uint32_t reference)
+{
+    if (component->was_set != NULL) {
+        component->was_set(instance->self, reference);
+    }
+}
+
 /* Starts of other variables than those that may be set, or of arrays, are no start values. */
 static void put_start(vi_instance *instance, const vi_start *start)
 {
     const vi_variable *variable =
-        start->reference < component->variable_count ? &component->variables[start->reference] : NULL;
+        start->reference < description->variable_count ? &description->variables[start->reference] : NULL;
     if (variable == NULL || variable->access == VI_READ_ONLY || variable->access == VI_SET_STATE
         || variable->count != 1) {
         return;
@@ -80,12 +88,12 @@ static void put_start(vi_instance *instance, const vi_start *start)
     } else {
         memcpy(field, &start->bits, sizeof start->bits);
     }
-    component->was_set(instance->self, start->reference);
+    announce(instance, start->reference);
 }
 
 void vi_instance_reset(vi_instance *instance)
 {
-    memset(instance->self, 0, component->struct_size);
+    memset(instance->self, 0, description->struct_size);
     component->defaults(instance->self);
     if (component->attach != NULL) {
         component->attach(instance->self, instance->resources);
@@ -138,11 +146,11 @@ static void warn(const vi_instance *instance, const char *function, const char *
 
 static bool number(vi_instance *instance, const char *function, const char *folder)
 {
-    instance->references = calloc(component->variable_count, sizeof *instance->references);
+    instance->references = calloc(description->variable_count, sizeof *instance->references);
     if (instance->references == NULL) {
         return vi_instance_fail(instance, function, "out of memory");
     }
-    instance->reference_count = vi_references_read(folder, instance->references, component->variable_count);
+    instance->reference_count = vi_references_read(folder, instance->references, description->variable_count);
     return instance->reference_count > 0
            || vi_instance_fail(instance, function, "expected the FMU's folder of resources with references.txt, got %s",
                                folder != NULL ? folder : "none");
@@ -154,11 +162,11 @@ bool vi_instance_describe(vi_instance *instance, const char *function, const cha
         return false;
     }
     vi_sizes_read(folder, &instance->sizes);
-    instance->starts = calloc(component->variable_count, sizeof(vi_start));
+    instance->starts = calloc(description->variable_count, sizeof(vi_start));
     if (instance->starts == NULL) {
         return vi_instance_fail(instance, function, "out of memory");
     }
-    instance->start_count = vi_starts_read(folder, instance->starts, component->variable_count);
+    instance->start_count = vi_starts_read(folder, instance->starts, description->variable_count);
     if (component->open != NULL) {
         instance->message[0] = '\0';
         instance->resources = component->open(folder, instance->message);
@@ -254,6 +262,18 @@ bool vi_instance_initialize(vi_instance *instance, const char *function)
     return true;
 }
 
+double vi_instance_time(const vi_instance *instance)
+{
+    const char *field = (const char *)instance->self + description->time;
+    return component->time != NULL ? component->time(instance->self) : *(const double *)(const void *)field;
+}
+
+vi_step_result vi_instance_step(vi_instance *instance, const vi_step_request *request)
+{
+    instance->message[0] = '\0';
+    return component->step(instance->self, request, instance->message);
+}
+
 bool vi_instance_is_finite(vi_instance *instance, const char *function, const double values[], size_t count)
 {
     bool finite = component->exchange->states_are_finite(instance->self);
@@ -284,14 +304,14 @@ static const vi_variable *find(vi_instance *instance, const char *function, int 
     size_t own = reference;
     if (instance->references != NULL) {
         const bool described = reference >= 1 && reference <= instance->reference_count;
-        own = described ? instance->references[reference - 1] : component->variable_count;
+        own = described ? instance->references[reference - 1] : description->variable_count;
     }
-    if (own >= component->variable_count || component->variables[own].type != type) {
+    if (own >= description->variable_count || description->variables[own].type != type) {
         vi_instance_fail(instance, function, "value reference %lu is not a variable of this type",
                          (unsigned long)reference);
         return NULL;
     }
-    return &component->variables[own];
+    return &description->variables[own];
 }
 
 void vi_instance_refresh(vi_instance *instance)
@@ -301,6 +321,7 @@ void vi_instance_refresh(vi_instance *instance)
     }
     if (instance->mode == VI_MODE_INITIALIZATION) {
         /* outputs follow the start values; a bad parameter is reported when initialization ends */
+        instance->message[0] = '\0';
         (void)component->initialize(instance->self, instance->start_time, instance->message);
     } else if (((int)instance->mode & VI_RUNNING) != 0) {
         component->update_outputs(instance->self);
@@ -359,9 +380,9 @@ static bool may_set(vi_instance *instance, const char *function, const vi_variab
 /* Place of a state among those that the description has: of both halves perhaps fewer than were compiled in. */
 static size_t place_of_state(const vi_instance *instance, uint32_t own)
 {
-    const size_t most = component->state_count / 2, described = component->exchange->states(instance->self) / 2;
+    const size_t most = description->state_count / 2, described = component->exchange->states(instance->self) / 2;
     size_t i = 0;
-    while (i < component->state_count && component->states[i] != own) {
+    while (i < description->state_count && description->states[i] != own) {
         ++i;
     }
     return i / most * described + i % most;
@@ -382,7 +403,7 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
             return vi_instance_fail(instance, function, "expected more than %lu values", (unsigned long)value_count);
         }
         void *field = (char *)instance->self + variable->offset;
-        const uint32_t own = (uint32_t)(variable - component->variables);
+        const uint32_t own = (uint32_t)(variable - description->variables);
         if (variable->access == VI_SET_STATE) {
             if (!changes_states) {
                 component->exchange->get_states(instance->self, states);
@@ -392,7 +413,7 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
         }
         convert(field, (void *)(uintptr_t)values, first, variable->count);
         if (variable->access != VI_SET_STATE) {
-            component->was_set(instance->self, own);
+            announce(instance, own);
         }
         first += variable->count;
     }

@@ -79,6 +79,12 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 /* Initialization's end: false (with the component's message logged) when a parameter is bad. Logs its warning. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
 
+/* Present time, s. */
+double vi_instance_time(const vi_instance *instance);
+
+/* Advance the component; what is wrong with the step is in `message`. */
+vi_step_result vi_instance_step(vi_instance *instance, const vi_step_request *request);
+
 /* Make it one of model exchange, before anything else is done with it. */
 void vi_instance_exchange(vi_instance *instance);
 

@@ -1,17 +1,16 @@
-/* What a component without events of its own gives to the adapters. */
+/* A component without a motion of its own: its outputs follow from its inputs and the time, which a step only carries along. */
 #ifndef VIBROIMPACT_PLAIN_H
 #define VIBROIMPACT_PLAIN_H
 
 #include "component.h"
 
+/* The end of `initialize`, after its checks: start, unless they have complained. */
+bool vi_plain_start(void *self, double start_time, const char message[VI_MESSAGE_LENGTH]);
+
 /* Has the step a finite end after its start? If not, the message says so. */
 bool vi_plain_step_is_good(const vi_step_request *request, char message[VI_MESSAGE_LENGTH]);
 
-/* Nothing follows from a variable that was set but the outputs. */
-void vi_plain_was_set(void *self, uint32_t value_reference);
-
-/* Nothing is pending, ever. */
-bool vi_plain_resolve(void *self, char message[VI_MESSAGE_LENGTH]);
-bool vi_plain_never(const void *self);
+/* The step of such a component, which may begin and end anywhere. */
+vi_step_result vi_plain_step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH]);
 
 #endif

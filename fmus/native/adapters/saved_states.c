@@ -30,7 +30,13 @@ static uint64_t hash(uint64_t h, const void *data, size_t size)
 
 static uint64_t token_hash(void)
 {
-    return hash(HASH_START, vi_this_component.token, strlen(vi_this_component.token));
+    return hash(HASH_START, vi_this_description.token, strlen(vi_this_description.token));
+}
+
+static size_t used_size(const vi_instance *instance)
+{
+    const bool whole = vi_this_component.used_size == NULL;
+    return whole ? vi_this_description.struct_size : vi_this_component.used_size(instance->self);
 }
 
 /* Of all that a state says: the header from `size` on, and the data. */
@@ -43,7 +49,7 @@ static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
 
 bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved)
 {
-    const size_t size = vi_this_component.used_size(instance->self);
+    const size_t size = used_size(instance);
     vi_saved *state = *saved;
     if (state == NULL || state->capacity < size) {
         state = realloc(state, sizeof(vi_saved) + size);
@@ -66,10 +72,10 @@ bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **sa
 
 bool vi_instance_restore(vi_instance *instance, const char *function, const vi_saved *saved)
 {
-    if (saved == NULL || saved->size > vi_this_component.struct_size) {
+    if (saved == NULL || saved->size > vi_this_description.struct_size) {
         return vi_instance_fail(instance, function, "expected a saved state, got none");
     }
-    if (vi_this_component.attach != NULL && saved->size != vi_this_component.used_size(instance->self)) {
+    if (vi_this_component.attach != NULL && saved->size != used_size(instance)) {
         return vi_instance_fail(instance, function, "expected a state that fits the FMU's resources, got one of others");
     }
     if ((saved->exchange != 0) != instance->exchange) {
@@ -109,7 +115,7 @@ vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsig
     memcpy(&header, bytes, sizeof header);
     const unsigned char *data = bytes + sizeof header;
     if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0 || header.token_hash != token_hash()
-        || header.size != size - sizeof header || header.size > vi_this_component.struct_size
+        || header.size != size - sizeof header || header.size > vi_this_description.struct_size
         || header.state_hash != state_hash(&header, data)) {
         vi_instance_fail(instance, function, "these bytes are not an undamaged state of this component and version");
         return NULL;

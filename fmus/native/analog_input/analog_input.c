@@ -46,7 +46,6 @@ static void check_parameters(const analog_input *it, char *message)
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     analog_input *it = self;
-    message[0] = '\0';
     check_parameters(it, message);
     vi_check_finite(message, "start time", start_time);
     if (message[0] != '\0') {
@@ -66,7 +65,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     analog_input *it = self;
-    message[0] = '\0';
+    (void)message;
     if (it->pending) {
         sample_now(it, it->next - 1);
     }
@@ -105,31 +104,11 @@ static bool event_pending(const void *self)
     return ((const analog_input *)self)->pending != 0;
 }
 
-static double present_time(const void *self)
-{
-    return ((const analog_input *)self)->time;
-}
-
-static size_t used_size(const void *self)
-{
-    (void)self;
-    return sizeof(analog_input);
-}
-
 const vi_component vi_this_component = {
-    .name = ANALOG_INPUT_NAME,
-    .token = ANALOG_INPUT_TOKEN,
-    .variables = analog_input_variables,
-    .variable_count = ANALOG_INPUT_VARIABLE_COUNT,
-    .struct_size = sizeof(analog_input),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
     .step = step,
     .resolve = resolve,
     .event_pending = event_pending,
-    .needs_events = vi_plain_never,
-    .time = present_time,
-    .used_size = used_size,
 };

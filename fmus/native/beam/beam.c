@@ -494,7 +494,6 @@ static void update_outputs(void *self)
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     beam *b = self;
-    message[0] = '\0';
     if (!parameters_are_good(b, message) || !fill_model(b, message)
         || !vi_structure_component_start(&b->body, start_time, "modal_displacement_start", message)) {
         return false;
@@ -518,7 +517,6 @@ static void was_set(void *self, uint32_t reference)
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     beam *b = self;
-    message[0] = '\0';
     if (!vi_structure_component_resolve(&b->body, message)) {
         return false;
     }
@@ -539,7 +537,6 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
 {
     beam *b = self;
     vi_instant target;
-    message[0] = '\0';
     drive(b);
     check_inputs(b, message);
     check_drive(b, message);
@@ -582,13 +579,6 @@ static size_t used_size(const void *self)
 VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
 
 const vi_component vi_this_component = {
-    .name = BEAM_NAME,
-    .token = BEAM_TOKEN,
-    .variables = beam_variables,
-    .variable_count = BEAM_VARIABLE_COUNT,
-    .states = beam_states,
-    .state_count = BEAM_STATE_COUNT,
-    .struct_size = sizeof(beam),
     .defaults = defaults,
     .initialize = initialize,
     .was_set = was_set,

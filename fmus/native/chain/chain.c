@@ -245,7 +245,6 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 {
     chain *c = self;
     vi_chain_modes modes;
-    message[0] = '\0';
     if (!parameters_are_good(c, message) || !find_modes(c, &modes, message)) {
         return false;
     }
@@ -274,7 +273,6 @@ static void was_set(void *self, uint32_t reference)
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     chain *c = self;
-    message[0] = '\0';
     if (!vi_structure_component_resolve(&c->body, message)) {
         return false;
     }
@@ -295,7 +293,6 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
 {
     chain *c = self;
     vi_instant target;
-    message[0] = '\0';
     drive(c);
     check_inputs(c, message);
     check_drive(c, message);
@@ -335,13 +332,6 @@ static size_t used_size(const void *self)
 VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
 
 const vi_component vi_this_component = {
-    .name = CHAIN_NAME,
-    .token = CHAIN_TOKEN,
-    .variables = chain_variables,
-    .variable_count = CHAIN_VARIABLE_COUNT,
-    .states = chain_states,
-    .state_count = CHAIN_STATE_COUNT,
-    .struct_size = sizeof(chain),
     .defaults = defaults,
     .initialize = initialize,
     .was_set = was_set,

@@ -4,8 +4,8 @@
 #include <math.h>
 
 #include "body/law_check.h"
-#include "plain.h"
 #include "impact_stop_variables.h"
+#include "plain.h"
 
 /* A body comes to the surface within the rounding of its displacement: this times that and the position, m. */
 static const double SURFACE_ROUNDING = 4.0 * DBL_EPSILON;
@@ -40,8 +40,9 @@ static void update_outputs(void *self)
     }
 }
 
-static bool parameters_are_good(const impact_stop *stop, char *message)
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
+    const impact_stop *stop = self;
     if (!vi_contact_law_exists(stop->law.law) || !vi_contact_law_is_own(stop->law.law)) {
         vi_complain_of_law(message, "law", "", vi_contact_law_is_own, stop->law.law);
     } else {
@@ -51,42 +52,7 @@ static bool parameters_are_good(const impact_stop *stop, char *message)
         vi_complain(message, "side: expected 1 (upper) or 2 (lower), got %lld", (long long)stop->side);
     }
     vi_check_finite(message, "position", stop->position);
-    return message[0] == '\0';
-}
-
-static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
-{
-    impact_stop *stop = self;
-    message[0] = '\0';
-    if (!parameters_are_good(stop, message)) {
-        return false;
-    }
-    stop->time = start_time;
-    update_outputs(stop);
-    return true;
-}
-
-/* A stop has no motion of its own: a step only carries its time along. */
-static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
-{
-    impact_stop *stop = self;
-    if (!vi_plain_step_is_good(request, message)) {
-        return VI_STEP_ERROR;
-    }
-    stop->time = request->time + request->size;
-    update_outputs(stop);
-    return VI_STEP_DONE;
-}
-
-static double present_time(const void *self)
-{
-    return ((const impact_stop *)self)->time;
-}
-
-static size_t used_size(const void *self)
-{
-    (void)self;
-    return sizeof(impact_stop);
+    return vi_plain_start(self, start_time, message);
 }
 
 /* ---- model exchange: no states, no events; outputs follow inputs ---- */
@@ -158,20 +124,9 @@ static const vi_model_exchange exchange = {
 };
 
 const vi_component vi_this_component = {
-    .name = IMPACT_STOP_NAME,
-    .token = IMPACT_STOP_TOKEN,
-    .variables = impact_stop_variables,
-    .variable_count = IMPACT_STOP_VARIABLE_COUNT,
-    .struct_size = sizeof(impact_stop),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
-    .step = step,
-    .resolve = vi_plain_resolve,
-    .event_pending = vi_plain_never,
-    .needs_events = vi_plain_never,
-    .time = present_time,
-    .used_size = used_size,
+    .step = vi_plain_step,
     .exchange = &exchange,
 };

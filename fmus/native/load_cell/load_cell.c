@@ -56,7 +56,6 @@ static void check_inputs(const load_cell *it, char *message)
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     load_cell *it = self;
-    message[0] = '\0';
     it->counted = it->impulse; /* before the start */
     check_parameters(&it->cell.settings, message);
     check_inputs(it, message);
@@ -84,11 +83,9 @@ static bool take_impacts(load_cell *it, double end, double slope)
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     load_cell *it = self;
-    message[0] = '\0';
-    if (!vi_plain_step_is_good(request, message)) {
-        return VI_STEP_ERROR;
+    if (vi_plain_step_is_good(request, message)) {
+        check_inputs(it, message);
     }
-    check_inputs(it, message);
     if (message[0] != '\0') {
         return VI_STEP_ERROR;
     }
@@ -96,8 +93,8 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     const double slope = (it->force - it->cell.force) / request->size;
     it->cell.time = request->time;
     if (!take_impacts(it, end, slope)) {
-        (void)snprintf(message, VI_MESSAGE_LENGTH, "impulse: expected at most %d impacts within one contact_duration (%.17g s),"
-                       " got more. Take a shorter contact_duration", VI_CELL_PULSES, it->cell.settings.contact_duration);
+        vi_complain(message, "impulse: expected at most %d impacts within one contact_duration (%.17g s), got more. Take a"
+                             " shorter contact_duration", VI_CELL_PULSES, it->cell.settings.contact_duration);
         return VI_STEP_ERROR;
     }
     vi_cell_advance(&it->cell, end, slope);
@@ -106,30 +103,15 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     return VI_STEP_DONE;
 }
 
-static double present_time(const void *self)
-{
-    return ((const load_cell *)self)->cell.time;
-}
-
 static size_t used_size(const void *self)
 {
     return sizeof(load_cell) - vi_cell_unused(&((const load_cell *)self)->cell);
 }
 
 const vi_component vi_this_component = {
-    .name = LOAD_CELL_NAME,
-    .token = LOAD_CELL_TOKEN,
-    .variables = load_cell_variables,
-    .variable_count = LOAD_CELL_VARIABLE_COUNT,
-    .struct_size = sizeof(load_cell),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
     .step = step,
-    .resolve = vi_plain_resolve,
-    .event_pending = vi_plain_never,
-    .needs_events = vi_plain_never,
-    .time = present_time,
     .used_size = used_size,
 };

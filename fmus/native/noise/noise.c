@@ -31,8 +31,7 @@ static void update_outputs(void *self)
 
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
-    noise *it = self;
-    message[0] = '\0';
+    const noise *it = self;
     vi_check_not_negative(message, "rms", it->rms);
     vi_check_positive(message, "rate", it->rate);
     vi_check_finite(message, "start time", start_time);
@@ -42,51 +41,12 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     if (it->channel < 0) {
         vi_complain(message, "channel: expected a number >= 0, got %lld", (long long)it->channel);
     }
-    if (message[0] != '\0') {
-        return false;
-    }
-    it->time = start_time;
-    update_outputs(it);
-    return true;
-}
-
-/* The noise follows the time alone: a step may begin and end anywhere. */
-static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
-{
-    noise *it = self;
-    if (!vi_plain_step_is_good(request, message)) {
-        return VI_STEP_ERROR;
-    }
-    it->time = request->time + request->size;
-    update_outputs(it);
-    return VI_STEP_DONE;
-}
-
-static double present_time(const void *self)
-{
-    return ((const noise *)self)->time;
-}
-
-static size_t used_size(const void *self)
-{
-    (void)self;
-    return sizeof(noise);
+    return vi_plain_start(self, start_time, message);
 }
 
 const vi_component vi_this_component = {
-    .name = NOISE_NAME,
-    .token = NOISE_TOKEN,
-    .variables = noise_variables,
-    .variable_count = NOISE_VARIABLE_COUNT,
-    .struct_size = sizeof(noise),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
-    .step = step,
-    .resolve = vi_plain_resolve,
-    .event_pending = vi_plain_never,
-    .needs_events = vi_plain_never,
-    .time = present_time,
-    .used_size = used_size,
+    .step = vi_plain_step,
 };

@@ -162,7 +162,6 @@ static void update_outputs(void *self)
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     oscillator *o = self;
-    message[0] = '\0';
     if (!parameters_are_good(o, message)) {
         return false;
     }
@@ -189,7 +188,6 @@ static void was_set(void *self, uint32_t reference)
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     oscillator *o = self;
-    message[0] = '\0';
     if (!vi_structure_component_resolve(&o->body, message)) {
         return false;
     }
@@ -210,7 +208,6 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
 {
     oscillator *o = self;
     vi_instant target;
-    message[0] = '\0';
     drive(o);
     check_inputs(o, message);
     check_drive(o, message);
@@ -251,13 +248,6 @@ static size_t used_size(const void *self)
 VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
 
 const vi_component vi_this_component = {
-    .name = OSCILLATOR_NAME,
-    .token = OSCILLATOR_TOKEN,
-    .variables = oscillator_variables,
-    .variable_count = OSCILLATOR_VARIABLE_COUNT,
-    .states = oscillator_states,
-    .state_count = OSCILLATOR_STATE_COUNT,
-    .struct_size = sizeof(oscillator),
     .defaults = defaults,
     .initialize = initialize,
     .was_set = was_set,

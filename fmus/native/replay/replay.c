@@ -90,34 +90,11 @@ static void check_channels(const replay *it, char *message)
 
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
-    replay *it = self;
-    message[0] = '\0';
+    const replay *it = self;
     check_channels(it, message);
     check_parameters(it, message);
     vi_check_finite(message, "start time", start_time);
-    if (message[0] != '\0') {
-        return false;
-    }
-    it->time = start_time;
-    update_outputs(it);
-    return true;
-}
-
-/* What is played follows the time alone: a step may begin and end anywhere. */
-static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
-{
-    replay *it = self;
-    if (!vi_plain_step_is_good(request, message)) {
-        return VI_STEP_ERROR;
-    }
-    it->time = request->time + request->size;
-    update_outputs(it);
-    return VI_STEP_DONE;
-}
-
-static double present_time(const void *self)
-{
-    return ((const replay *)self)->time;
+    return vi_plain_start(self, start_time, message);
 }
 
 /* The recording itself stays where it is. */
@@ -127,20 +104,10 @@ static size_t used_size(const void *self)
 }
 
 const vi_component vi_this_component = {
-    .name = REPLAY_NAME,
-    .token = REPLAY_TOKEN,
-    .variables = replay_variables,
-    .variable_count = REPLAY_VARIABLE_COUNT,
-    .struct_size = sizeof(replay),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
-    .step = step,
-    .resolve = vi_plain_resolve,
-    .event_pending = vi_plain_never,
-    .needs_events = vi_plain_never,
-    .time = present_time,
+    .step = vi_plain_step,
     .used_size = used_size,
     .sized = sized,
     .open = open_recording,

@@ -25,18 +25,18 @@ def _lines(component: ComponentDescription) -> Iterator[str]:
     guard = f"{prefix}_VARIABLES_H"
     yield f"/* Generated from {component.folder}/variables.toml; edit that file and build again. */"
     yield from (f"#ifndef {guard}", f"#define {guard}", "")
-    yield from ("#include <stddef.h>", '#include "component.h"', f'#include "{component.header}"', "")
-    yield f'#define {prefix}_NAME "{component.name}"'
-    yield f'#define {prefix}_TOKEN "{component.token}"'
-    yield from ("", "enum {")
+    yield from (
+        "#include <stddef.h>",
+        '#include "component.h"',
+        f'#include "{component.header}"',
+        "",
+        "enum {",
+    )
     yield from (f"    {prefix}_{v.code} = {v.value_reference}," for v in component.variables)
-    yield from (f"    {prefix}_VARIABLE_COUNT = {len(component.variables)}", "};", "")
-    yield f"static const vi_variable {component.folder}_variables[] = {{"
+    yield from ("};", "", f"static const vi_variable {component.folder}_variables[] = {{")
     states = frozenset(component.states())
     yield from (_row(component, v, states) for v in component.variables)
-    yield "};"
-    yield from _states(component, prefix)
-    yield from ("", "#endif")
+    yield from ("};", *_states(component, prefix), *_description(component), "", "#endif")
 
 
 def _states(component: ComponentDescription, prefix: str) -> Iterator[str]:
@@ -44,10 +44,23 @@ def _states(component: ComponentDescription, prefix: str) -> Iterator[str]:
     codes = {v.name: v.code for v in component.variables}
     states = component.states()
     if states:
-        yield from ("", f"enum {{ {prefix}_STATE_COUNT = {len(states)} }};")
-        yield f"static const uint32_t {component.folder}_states[] = {{"
+        yield from ("", f"static const uint32_t {component.folder}_states[] = {{")
         yield from (f"    {prefix}_{codes[name]}," for name in states)
         yield "};"
+
+
+def _description(component: ComponentDescription) -> Iterator[str]:
+    """Yield the description that the adapters link: one C file alone includes the header."""
+    (time,) = (v.field for v in component.variables if v.causality == "independent")
+    yield from ("", "const vi_description vi_this_description = {", f'    .token = "{component.token}",')
+    yield f"    .struct_size = sizeof({component.struct}),"
+    yield f"    .time = offsetof({component.struct}, {time}),"
+    yield f"    .variables = {component.folder}_variables,"
+    yield f"    .variable_count = {len(component.variables)},"
+    if states := component.states():
+        yield f"    .states = {component.folder}_states,"
+        yield f"    .state_count = {len(states)},"
+    yield "};"
 
 
 def _row(component: ComponentDescription, variable: Variable, states: AbstractSet[str]) -> str:

@@ -107,7 +107,9 @@ C_SOURCE = """
 #include "small_variables.h"
 int main(void) {
     const vi_variable *v = small_variables;
-    if (SMALL_VARIABLE_COUNT != 9 || sizeof small_variables / sizeof *v != 9) return 1;
+    const vi_description *shown = &vi_this_description;
+    if (shown->variables != v || shown->variable_count != 9 || sizeof small_variables / sizeof *v != 9) return 1;
+    if (shown->struct_size != sizeof(small) || shown->time != offsetof(small, time)) return 1;
     if (SMALL_CONTACT_LAW_2 != 4) return 2;
     if (v[4].offset != offsetof(small, contacts) + sizeof(((small *)0)->contacts[0])) return 2;
     if (v[SMALL_ROWS].count != 12 || v[SMALL_ROWS].access != VI_READ_ONLY) return 3;
@@ -207,7 +209,7 @@ def test_both_versions_and_the_c_code_have_one_token_that_follows_the_file(
 ) -> None:
     assert f'instantiationToken="{small.token}"' in model_description(small, "3.0")
     assert f'guid="{small.token}"' in model_description(small, "2.0")
-    assert f'#define SMALL_TOKEN "{small.token}"' in c_header(small)
+    assert f'.token = "{small.token}",' in c_header(small)
     other = tmp_path / "other.toml"
     other.write_text(SMALL + "# changed\n", encoding="utf-8")
     assert read_component(other).token != small.token
