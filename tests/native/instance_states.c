@@ -1,5 +1,6 @@
 /* What both adapters share: instances, variables and saved states, of a small component made for this test. */
 #include "../../fmus/native/adapters/instance.c"
+#include "../../fmus/native/adapters/model_exchange.c"
 #include "../../fmus/native/adapters/resources.c"
 #include "../../fmus/native/adapters/saved_states.c"
 

@@ -39,11 +39,11 @@ typedef struct {
 } vi_description;
 
 /* What a component gives to an importer that integrates it (model exchange). Between events its derivatives and its
- * indicators are smooth; all that jumps does so in `handle_event`. */
+ * indicators are smooth; all that jumps does so in `handle_event`. One without states gives `set_time` alone. */
 typedef struct {
     /* Numbers of states and of event indicators of the model description. */
-    size_t (*states)(const void *self);
-    size_t (*indicators)(const void *self);
+    size_t (*states)(void *self);
+    size_t (*indicators)(void *self);
     /* From its next initialization on it is integrated by the importer; called after `defaults`. */
     void (*enable)(void *self);
     /* Initialization has ended. False, with all reasons in `message`, when this set-up cannot be integrated. */
@@ -52,7 +52,7 @@ typedef struct {
     bool (*set_time)(void *self, double time);
     void (*get_states)(void *self, double states[]);
     void (*set_states)(void *self, const double states[]);
-    bool (*states_are_finite)(const void *self);
+    bool (*states_are_finite)(void *self);
     void (*get_nominals)(void *self, double nominals[]);
     void (*get_derivatives)(void *self, double derivatives[]);
     void (*get_indicators)(void *self, double indicators[]);

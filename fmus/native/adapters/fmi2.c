@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "instance.h"
+#include "model_exchange.h"
 #include "saved_states.h"
 
 #define UNUSED(argument) (void)(argument)

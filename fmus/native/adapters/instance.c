@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "model_exchange.h"
 #include "sizes.h"
 
 static const vi_component *const component = &vi_this_component;
@@ -102,7 +103,7 @@ void vi_instance_reset(vi_instance *instance)
         component->sized(instance->self, instance->sizes.of[i].block, instance->sizes.of[i].size);
     }
     if (instance->exchange) {
-        component->exchange->enable(instance->self);
+        vi_instance_exchange(instance);
     }
     for (size_t i = 0; i < instance->start_count; ++i) {
         put_start(instance, &instance->starts[i]);
@@ -136,7 +137,7 @@ bool vi_instance_fail(vi_instance *instance, const char *function, const char *f
     return false;
 }
 
-static void warn(const vi_instance *instance, const char *function, const char *format, ...)
+void vi_instance_warn(const vi_instance *instance, const char *function, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -194,30 +195,15 @@ static const char *mode_name(vi_mode_of_use mode)
 
 bool vi_instance_expect(vi_instance *instance, const char *function, int modes)
 {
-    if (((int)instance->mode & modes) != 0) {
-        return true;
+    if (instance == NULL || ((int)instance->mode & modes) != 0) {
+        return instance != NULL;
     }
     return vi_instance_fail(instance, function, "not allowed now: the instance is %s", mode_name(instance->mode));
 }
 
-void vi_instance_exchange(vi_instance *instance)
-{
-    instance->exchange = true;
-    component->exchange->enable(instance->self);
-}
-
-bool vi_instance_expect_exchange(vi_instance *instance, const char *function, int modes)
-{
-    if (!instance->exchange) {
-        return vi_instance_fail(instance, function, "not allowed: the instance was made for co-simulation. Advance it by"
-                                " doStep, or make one for model exchange");
-    }
-    return vi_instance_expect(instance, function, modes);
-}
-
 bool vi_instance_expect_steps(vi_instance *instance, const char *function)
 {
-    return !instance->exchange
+    return instance == NULL || !instance->exchange
            || vi_instance_fail(instance, function, "not allowed: the instance was made for model exchange. Integrate its"
                                " states, or make one for co-simulation");
 }
@@ -249,14 +235,11 @@ bool vi_instance_initialize(vi_instance *instance, const char *function)
     if (!component->initialize(instance->self, instance->start_time, instance->message)) {
         return vi_instance_fail(instance, function, "%s", instance->message);
     }
-    if (instance->exchange) {
-        char reason[VI_MESSAGE_LENGTH] = "";
-        if (!component->exchange->begin(instance->self, reason)) {
-            return vi_instance_fail(instance, function, "%s", reason);
-        }
+    if (instance->exchange && !vi_instance_begin_exchange(instance, function)) {
+        return false;
     }
     if (instance->message[0] != '\0') {
-        warn(instance, function, "%s", instance->message);
+        vi_instance_warn(instance, function, "%s", instance->message);
     }
     instance->outputs_stale = false;
     return true;
@@ -272,29 +255,6 @@ vi_step_result vi_instance_step(vi_instance *instance, const vi_step_request *re
 {
     instance->message[0] = '\0';
     return component->step(instance->self, request, instance->message);
-}
-
-bool vi_instance_is_finite(vi_instance *instance, const char *function, const double values[], size_t count)
-{
-    bool finite = component->exchange->states_are_finite(instance->self);
-    for (size_t i = 0; i < count; ++i) {
-        finite = finite && isfinite(values[i]);
-    }
-    if (!finite) {
-        warn(instance, function, "expected finite states, and finite values of them, got others. Try a shorter step");
-    }
-    return finite;
-}
-
-bool vi_instance_handle_event(vi_instance *instance, const char *function, bool *states_changed, bool *terminate)
-{
-    if (!component->exchange->states_are_finite(instance->self)) {
-        return vi_instance_fail(instance, function, "expected finite states, got others");
-    }
-    instance->message[0] = '\0';
-    instance->outputs_stale = true;
-    return component->exchange->handle_event(instance->self, states_changed, terminate, instance->message)
-           || vi_instance_fail(instance, function, "%s", instance->message);
 }
 
 /* ---- variables ---- */

@@ -66,6 +66,7 @@ bool vi_token_is_of_export(const char *token);
 
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
+void vi_instance_warn(const vi_instance *instance, const char *function, const char *format, ...);
 
 /* Begin at `start` with this stop time, infinite where there is none; false after logging where it lies before `start`. */
 bool vi_instance_set_experiment(vi_instance *instance, const char *function, double start, double stop);
@@ -73,7 +74,7 @@ bool vi_instance_set_experiment(vi_instance *instance, const char *function, dou
 /* Does a step from `time` by `size` end by the stop time, to rounding? If not, log it. */
 bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size);
 
-/* Is the instance in one of these modes? If not, log it. */
+/* Is there an instance, and in one of these modes? If not, log it. */
 bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 
 /* Initialization's end: false (with the component's message logged) when a parameter is bad. Logs its warning. */
@@ -85,21 +86,8 @@ double vi_instance_time(const vi_instance *instance);
 /* Advance the component; what is wrong with the step is in `message`. */
 vi_step_result vi_instance_step(vi_instance *instance, const vi_step_request *request);
 
-/* Make it one of model exchange, before anything else is done with it. */
-void vi_instance_exchange(vi_instance *instance);
-
-/* Is the instance one of model exchange, and in one of these modes? If not, log it. */
-bool vi_instance_expect_exchange(vi_instance *instance, const char *function, int modes);
-
-/* Is it one of co-simulation? If not, log it. */
+/* False, after logging, for an instance of model exchange. */
 bool vi_instance_expect_steps(vi_instance *instance, const char *function);
-
-/* Model exchange: are the states finite, and `values` that were computed from them? If not, log it: the importer can
- * try a shorter step. */
-bool vi_instance_is_finite(vi_instance *instance, const char *function, const double values[], size_t count);
-
-/* Model exchange: resolve what happens at this instant. */
-bool vi_instance_handle_event(vi_instance *instance, const char *function, bool *states_changed, bool *terminate);
 
 /* Recompute the outputs if something was set since: in initialization mode, where the motion starts anew. */
 void vi_instance_refresh(vi_instance *instance);

@@ -57,71 +57,13 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 
 /* ---- model exchange: no states, no events; outputs follow inputs ---- */
 
-static size_t none(const void *self)
-{
-    (void)self;
-    return 0;
-}
-
-static void nothing(void *self)
-{
-    (void)self;
-}
-
-static bool begin(void *self, char message[VI_MESSAGE_LENGTH])
-{
-    (void)self;
-    message[0] = '\0';
-    return true;
-}
-
 static bool set_time(void *self, double time)
 {
     ((impact_stop *)self)->time = time;
     return isfinite(time);
 }
 
-static bool always_finite(const void *self)
-{
-    (void)self;
-    return true;
-}
-
-static void no_values(void *self, double values[])
-{
-    (void)self;
-    (void)values;
-}
-
-static void no_states(void *self, const double states[])
-{
-    (void)self;
-    (void)states;
-}
-
-static bool no_event(void *self, bool *changed, bool *limit, char message[VI_MESSAGE_LENGTH])
-{
-    (void)self;
-    *changed = *limit = false;
-    message[0] = '\0';
-    return true;
-}
-
-static const vi_model_exchange exchange = {
-    .states = none,
-    .indicators = none,
-    .enable = nothing,
-    .begin = begin,
-    .set_time = set_time,
-    .get_states = no_values,
-    .set_states = no_states,
-    .states_are_finite = always_finite,
-    .get_nominals = no_values,
-    .get_derivatives = no_values,
-    .get_indicators = no_values,
-    .handle_event = no_event,
-    .go_on = nothing,
-};
+static const vi_model_exchange exchange = {.set_time = set_time};
 
 const vi_component vi_this_component = {
     .defaults = defaults,

@@ -51,13 +51,13 @@ void vi_exchange_go_on(const vi_exchange_body *body);
 /* The table `NAME` of a component's functions of model exchange; `BIND(self)` returns its vi_exchange_body, and
  * `REFRESH(self)` gives inputs that were set to the body. */
 #define VI_EXCHANGE_TABLE(NAME, BIND, REFRESH)                                                                       \
-    static size_t NAME##_states(const void *self)                                                                    \
+    static size_t NAME##_states(void *self)                                                                          \
     {                                                                                                                \
-        return 2 * (size_t)BIND((void *)(uintptr_t)self).modes;                                                      \
+        return 2 * (size_t)BIND(self).modes;                                                                          \
     }                                                                                                                \
-    static size_t NAME##_indicators(const void *self)                                                                \
+    static size_t NAME##_indicators(void *self)                                                                      \
     {                                                                                                                \
-        return (size_t)BIND((void *)(uintptr_t)self).contacts;                                                       \
+        return (size_t)BIND(self).contacts;                                                                           \
     }                                                                                                                \
     static void NAME##_enable(void *self)                                                                            \
     {                                                                                                                \
@@ -84,9 +84,9 @@ void vi_exchange_go_on(const vi_exchange_body *body);
         const vi_exchange_body body = BIND(self);                                                                    \
         vi_exchange_set_states(&body, states);                                                                       \
     }                                                                                                                \
-    static bool NAME##_states_are_finite(const void *self)                                                           \
+    static bool NAME##_states_are_finite(void *self)                                                                 \
     {                                                                                                                \
-        const vi_exchange_body body = BIND((void *)(uintptr_t)self);                                                 \
+        const vi_exchange_body body = BIND(self);                                                                    \
         return vi_exchange_states_are_finite(&body);                                                                 \
     }                                                                                                                \
     static void NAME##_get_nominals(void *self, double nominals[])                                                   \
