@@ -175,15 +175,14 @@ def compile_component(
     ComponentError
         No compiler works, or one found an error.
     """
-    own = native / component.folder
-    shared = [native / "core", native / "adapters"]
-    sources = [path for path in _c_files(shared[0]) if is_part(component, path.relative_to(shared[0]))]
-    sources += [path for folder in (shared[1], own) for path in _c_files(folder)]
+    core, folders = native / "core", beside_core(component, native)
+    sources = [path for path in _c_files(core) if is_part(component, path.relative_to(core))]
+    sources += [path for folder in folders for path in _c_files(folder)]
     with tempfile.TemporaryDirectory() as folder:
         generated = Path(folder)
         (generated / header_name(component)).write_text(c_header(component), encoding="utf-8")
         library = generated / f"{component.name}{library_suffix() if platform is None else platform.suffix}"
-        include, defined = [*shared, own, generated, fmi_headers()], sizes(component)
+        include, defined = [core, *folders, generated, fmi_headers()], sizes(component)
         compile_library(
             library,
             sources,
@@ -195,6 +194,12 @@ def compile_component(
             platform=platform,
         )
         return library.read_bytes()
+
+
+def beside_core(component: ComponentDescription, native: Path = NATIVE) -> tuple[Path, ...]:
+    """Return the folders of C sources that a component has beside the core: those that are shared, then its own."""
+    is_body = component.repeats.get("contact", 0) > 0
+    return (native / "adapters", *([native / "bodies"] if is_body else ()), native / component.folder)
 
 
 def is_part(component: ComponentDescription, file: Path) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.packaging.build import NATIVE, is_part, sizes
+from vibroimpact.fmus.packaging.build import NATIVE, beside_core, is_part, sizes
 from vibroimpact.fmus.packaging.description import ComponentDescription, c_header, header_name
 
 BUILD_DESCRIPTION = "sources/buildDescription.xml"
@@ -34,7 +34,7 @@ def source_members(component: ComponentDescription, fmi: str, native: Path = NAT
     core = native / "core"
     files = {path.relative_to(core).as_posix(): path for path in core.rglob("*.[ch]")}
     files = {name: path for name, path in files.items() if is_part(component, Path(name))}
-    for folder in (native / "adapters", native / component.folder):
+    for folder in beside_core(component, native):
         files |= {path.name: path for path in folder.glob("*.[ch]") if not path.name.startswith(other)}
     members = {name: path.read_bytes() for name, path in sorted(files.items())}
     members[header_name(component)] = c_header(component).encode("utf-8")

@@ -20,6 +20,7 @@ from vibroimpact.fmus.packaging.build import (
     BUILT,
     CORE_LIBRARY,
     NATIVE,
+    beside_core,
     documentation,
     fmi_headers,
     is_part,
@@ -58,8 +59,8 @@ class Library:
         one = self.component
         if one is None:
             return tuple(core)
-        beside = [*(NATIVE / "adapters").glob("*.c"), *(NATIVE / one.folder).rglob("*.c")]
-        return (*(path for path in core if is_part(one, path.relative_to(NATIVE / "core"))), *sorted(beside))
+        beside = sorted(path for folder in beside_core(one, NATIVE) for path in folder.rglob("*.c"))
+        return (*(path for path in core if is_part(one, path.relative_to(NATIVE / "core"))), *beside)
 
     @cached_property
     def name(self) -> str:
@@ -71,7 +72,7 @@ class Library:
         options = [*find_compiler(), *LANGUAGE, "-w", "-fPIC", "-I", str(native / "core")]
         if (one := self.component) is None:
             return options
-        folders = (native / "adapters", native / one.folder, _generated(one), fmi_headers())
+        folders = (*beside_core(one, native), _generated(one), fmi_headers())
         options += ["-fvisibility=hidden", *(f"-D{name}={value}" for name, value in sizes(one).items())]
         return [*options, *(f"-I{folder}" for folder in folders)]
 

@@ -1,4 +1,4 @@
-"""Places of the C core where a fault can be put: a constant, a sign, a comparison, a branch."""
+"""Places of the C where a fault can be put: a constant, a sign, a comparison, a branch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.packaging.build import NATIVE
 
-ROOMS = ("body", "contact", "lanes", "modes", "motion")
+ROOMS = ("core/body", "core/contact", "core/lanes", "core/modes", "core/motion", "bodies")
 HEADERS = ("rounds.h", "rounds_many.h")
 """Headers that hold what is computed."""
 OF_INPUT = re.compile(r"vi_check|vi_complain|complaint|message|isfinite|isnan")
@@ -59,8 +59,8 @@ class Fault:
 
 @cache
 def places() -> tuple[Fault, ...]:
-    """Return all faults of the kinds above that the core has room for, in the order of its files."""
-    files = [path for room in ROOMS for path in sorted((NATIVE / "core" / room).rglob("*"))]
+    """Return all faults of the kinds above that the C has room for, in the order of its files."""
+    files = [path for room in ROOMS for path in sorted((NATIVE / room).rglob("*"))]
     wanted = [path for path in files if path.suffix == ".c" or path.name in HEADERS]
     return tuple(fault for path in wanted for fault in _faults_of(path))
 

@@ -40,7 +40,7 @@ static void defaults(void *self)
     for (int k = 0; k < BEAM_SENSORS; ++k) {
         b->sensor[k].location = 1.0;
     }
-    vi_structure_component_defaults(&b->body);
+    vi_body_defaults(&b->body);
 }
 
 static void sized(void *self, const char *block, int count)
@@ -49,7 +49,7 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "modes") == 0 && count >= 1 && count <= VI_MODES) {
         b->modes = b->modes_described = count;
     }
-    vi_structure_component_sized(&b->body, block, count);
+    vi_body_sized(&b->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -169,7 +169,7 @@ static bool parameters_are_good(const beam *b, char *message)
     check_choice(message, "impact_projection", b->impact_projection, PROJECTION_COLLOCATION);
     check_places(b, message);
     check_residual(b, message);
-    vi_structure_component_check(&b->body, message);
+    vi_body_check(&b->body, message);
     check_inputs(b, message);
     return message[0] == '\0';
 }
@@ -381,7 +381,7 @@ static bool fill_model(beam *b, char *message)
     vi_structure_model *model = &b->body.model;
     b->root_mass = sqrt(linear_density(b) * b->length);
     model->modes = (int32_t)b->modes;
-    model->contacts = vi_structure_component_ports(&b->body);
+    model->contacts = vi_body_ports(&b->body);
     find_residual(b, message);
     if (message[0] != '\0') {
         return false;
@@ -431,7 +431,7 @@ static void hold_inputs(beam *b)
         held[j] = b->force * b->forced_shape[j] - b->body.base_acceleration * b->participation[j];
         held_rate[j] = b->force_rate * b->forced_shape[j] - b->body.base_acceleration_rate * b->participation[j];
     }
-    vi_structure_component_hold(&b->body, held, held_rate);
+    vi_body_hold(&b->body, held, held_rate);
 }
 
 static void drive(beam *b)
@@ -443,14 +443,14 @@ static void drive(beam *b)
     for (int j = 0; j < b->modes; ++j) {
         force[j] = modal_amplitude(b, j);
     }
-    vi_structure_component_drive(&b->body, force);
+    vi_body_drive(&b->body, force);
 }
 
 static void refresh_inputs(beam *b)
 {
     drive(b);
     if (b->body.inputs_changed) {
-        vi_structure_component_take_impulses(&b->body);
+        vi_body_take_impulses(&b->body);
         hold_inputs(b);
     }
 }
@@ -458,7 +458,7 @@ static void refresh_inputs(beam *b)
 /* As an importer integrates it: its states are those of the modes. */
 static vi_exchange_body exchange_body(beam *b)
 {
-    vi_exchange_body body = vi_structure_component_exchange(&b->body);
+    vi_exchange_body body = vi_body_exchange(&b->body);
     body.modes = (int)b->modes_described;
     body.scale = b->root_mass;
     body.refused = b->depends_on_amplitude ? "amplitude" : body.refused;
@@ -469,11 +469,11 @@ static void update_outputs(void *self)
 {
     beam *b = self;
     refresh_inputs(b);
-    b->time = vi_structure_component_time(&b->body);
-    const vi_structure_component *body = &b->body;
+    b->time = vi_body_time(&b->body);
+    const vi_body *body = &b->body;
     const double moved = b->forcing_kind == FORCED_BY_BASE ? b->forcing_amplitude : 0.0;
-    const double base = vi_structure_component_base_acceleration(&b->body, moved);
-    vi_structure_component_outputs(&b->body, base);
+    const double base = vi_body_base_acceleration(&b->body, moved);
+    vi_body_outputs(&b->body, base);
     for (int j = 0; j < b->modes; ++j) {
         b->modal_displacement[j] = body->state.q[j] / b->root_mass;
         b->modal_velocity[j] = body->state.p[j] / b->root_mass;
@@ -495,7 +495,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 {
     beam *b = self;
     if (!parameters_are_good(b, message) || !fill_model(b, message)
-        || !vi_structure_component_start(&b->body, start_time, "modal_displacement_start", message)) {
+        || !vi_body_start(&b->body, start_time, "modal_displacement_start", message)) {
         return false;
     }
     hold_inputs(b);
@@ -510,14 +510,14 @@ static void was_set(void *self, uint32_t reference)
     if (reference == BEAM_FORCING_AMPLITUDE || reference == BEAM_FORCING_ANGULAR_FREQUENCY) {
         b->body.forcing_changed = 1;
     }
-    vi_structure_component_was_set(&b->body, reference, BEAM_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+    vi_body_was_set(&b->body, reference, BEAM_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
                                    BEAM_RECORD_TAKEN);
 }
 
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     beam *b = self;
-    if (!vi_structure_component_resolve(&b->body, message)) {
+    if (!vi_body_resolve(&b->body, message)) {
         return false;
     }
     update_outputs(b);
@@ -529,7 +529,7 @@ static void check_drive(const beam *b, char *message)
 {
     if (b->body.forcing_changed) {
         vi_check_finite(message, "forcing.amplitude", b->forcing_amplitude);
-        vi_structure_component_check_drive(&b->body, message);
+        vi_body_check_drive(&b->body, message);
     }
 }
 
@@ -540,18 +540,18 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     drive(b);
     check_inputs(b, message);
     check_drive(b, message);
-    if (!vi_structure_component_step_is_good(&b->body, request, &target, message)
-        || !vi_structure_component_resolve(&b->body, message)) {
+    if (!vi_body_step_is_good(&b->body, request, &target, message)
+        || !vi_body_resolve(&b->body, message)) {
         return VI_STEP_ERROR;
     }
-    if (!vi_structure_component_continues(&b->body)) {
-        vi_structure_component_take_impulses(&b->body);
+    if (!vi_body_continues(&b->body)) {
+        vi_body_take_impulses(&b->body);
         if (b->depends_on_amplitude) {
             follow_amplitudes(b);
         }
         hold_inputs(b);
     }
-    const vi_step_result result = vi_structure_component_advance(&b->body, target, request, message);
+    const vi_step_result result = vi_body_advance(&b->body, target, request, message);
     update_outputs(b);
     return result;
 }
@@ -563,17 +563,17 @@ static bool event_pending(const void *self)
 
 static bool needs_events(const void *self)
 {
-    return vi_structure_component_needs_events(&((const beam *)self)->body);
+    return vi_body_needs_events(&((const beam *)self)->body);
 }
 
 static double present_time(const void *self)
 {
-    return vi_structure_component_time(&((const beam *)self)->body);
+    return vi_body_time(&((const beam *)self)->body);
 }
 
 static size_t used_size(const void *self)
 {
-    return sizeof(beam) - vi_structure_component_unused(&((const beam *)self)->body);
+    return sizeof(beam) - vi_body_unused(&((const beam *)self)->body);
 }
 
 VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "body/modal/structure/component.h"
+#include "body.h"
 #include "modes/beam_residual.h"
 #include "motion/amplitude.h"
 
@@ -47,7 +47,7 @@ typedef struct {
     /* outputs */
     double modal_displacement[VI_MODES], modal_velocity[VI_MODES], modal_acceleration[VI_MODES];
     beam_sensor sensor[BEAM_SENSORS];
-    vi_structure_component body; /* last: its record is saved only as far as it is used, and nothing after that */
+    vi_body body; /* last: its record is saved only as far as it is used, and nothing after that */
 } beam;
 
 #endif

@@ -18,7 +18,7 @@ static void defaults(void *self)
     for (int i = 0; i < VI_MODES; ++i) {
         c->parameter.mass[i] = c->parameter.stiffness[i] = 1.0;
     }
-    vi_structure_component_defaults(&c->body);
+    vi_body_defaults(&c->body);
 }
 
 static void sized(void *self, const char *block, int count)
@@ -27,7 +27,7 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "masses") == 0 && count >= 1 && count <= VI_MODES) {
         c->masses = c->masses_described = count;
     }
-    vi_structure_component_sized(&c->body, block, count);
+    vi_body_sized(&c->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -86,7 +86,7 @@ static bool parameters_are_good(const chain *c, char *message)
             check_mass_number(message, name, c, c->contact_mass[k]);
         }
     }
-    vi_structure_component_check(&c->body, message);
+    vi_body_check(&c->body, message);
     check_inputs(c, message);
     return message[0] == '\0';
 }
@@ -151,7 +151,7 @@ static void fill_model(chain *c, const vi_chain_modes *modes)
     double force[VI_MODES];
     find_forces(c, force);
     model->modes = (int32_t)modes_of(c);
-    model->contacts = vi_structure_component_ports(&c->body);
+    model->contacts = vi_body_ports(&c->body);
     model->coupled = !modes->classical;
     memset(c->body.natural, 0, sizeof c->body.natural);
     for (int j = 0; j < model->modes; ++j) {
@@ -182,7 +182,7 @@ static void start_modes(chain *c)
 /* As an importer integrates it: its states are those of the masses. */
 static vi_exchange_body exchange_body(chain *c)
 {
-    vi_exchange_body body = vi_structure_component_exchange(&c->body);
+    vi_exchange_body body = vi_body_exchange(&c->body);
     body.modes = (int)c->masses_described;
     body.shape = (const double(*)[VI_MODES])c->shape;
     body.mass = c->parameter.mass;
@@ -201,7 +201,7 @@ static void hold_inputs(chain *c)
     }
     project(c, load, held);
     project(c, rate, held_rate);
-    vi_structure_component_hold(&c->body, held, held_rate);
+    vi_body_hold(&c->body, held, held_rate);
 }
 
 static void drive(chain *c)
@@ -209,7 +209,7 @@ static void drive(chain *c)
     double force[VI_MODES];
     if (c->body.forcing_changed) {
         find_forces(c, force);
-        vi_structure_component_drive(&c->body, force);
+        vi_body_drive(&c->body, force);
     }
 }
 
@@ -217,7 +217,7 @@ static void refresh_inputs(chain *c)
 {
     drive(c);
     if (c->body.inputs_changed) {
-        vi_structure_component_take_impulses(&c->body);
+        vi_body_take_impulses(&c->body);
         hold_inputs(c);
     }
 }
@@ -226,9 +226,9 @@ static void update_outputs(void *self)
 {
     chain *c = self;
     refresh_inputs(c);
-    c->time = vi_structure_component_time(&c->body);
-    const double base = vi_structure_component_base_acceleration(&c->body, c->forcing_base_acceleration);
-    vi_structure_component_outputs(&c->body, base);
+    c->time = vi_body_time(&c->body);
+    const double base = vi_body_base_acceleration(&c->body, c->forcing_base_acceleration);
+    vi_body_outputs(&c->body, base);
     for (int i = 0; i < c->masses; ++i) {
         c->displacement[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.q);
         c->velocity[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.p);
@@ -250,7 +250,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     }
     fill_model(c, &modes);
     start_modes(c);
-    if (!vi_structure_component_start(&c->body, start_time, "displacement_start", message)) {
+    if (!vi_body_start(&c->body, start_time, "displacement_start", message)) {
         return false;
     }
     hold_inputs(c);
@@ -266,14 +266,14 @@ static void was_set(void *self, uint32_t reference)
         || reference == CHAIN_FORCING_BASE_ACCELERATION || reference == CHAIN_FORCING_ANGULAR_FREQUENCY) {
         c->body.forcing_changed = 1;
     }
-    vi_structure_component_was_set(&c->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+    vi_body_was_set(&c->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
                                    CHAIN_RECORD_TAKEN);
 }
 
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     chain *c = self;
-    if (!vi_structure_component_resolve(&c->body, message)) {
+    if (!vi_body_resolve(&c->body, message)) {
         return false;
     }
     update_outputs(c);
@@ -285,7 +285,7 @@ static void check_drive(const chain *c, char *message)
 {
     if (c->body.forcing_changed) {
         check_forcing(c, message);
-        vi_structure_component_check_drive(&c->body, message);
+        vi_body_check_drive(&c->body, message);
     }
 }
 
@@ -296,15 +296,15 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     drive(c);
     check_inputs(c, message);
     check_drive(c, message);
-    if (!vi_structure_component_step_is_good(&c->body, request, &target, message)
-        || !vi_structure_component_resolve(&c->body, message)) {
+    if (!vi_body_step_is_good(&c->body, request, &target, message)
+        || !vi_body_resolve(&c->body, message)) {
         return VI_STEP_ERROR;
     }
-    if (!vi_structure_component_continues(&c->body)) {
-        vi_structure_component_take_impulses(&c->body);
+    if (!vi_body_continues(&c->body)) {
+        vi_body_take_impulses(&c->body);
         hold_inputs(c);
     }
-    const vi_step_result result = vi_structure_component_advance(&c->body, target, request, message);
+    const vi_step_result result = vi_body_advance(&c->body, target, request, message);
     update_outputs(c);
     return result;
 }
@@ -316,17 +316,17 @@ static bool event_pending(const void *self)
 
 static bool needs_events(const void *self)
 {
-    return vi_structure_component_needs_events(&((const chain *)self)->body);
+    return vi_body_needs_events(&((const chain *)self)->body);
 }
 
 static double present_time(const void *self)
 {
-    return vi_structure_component_time(&((const chain *)self)->body);
+    return vi_body_time(&((const chain *)self)->body);
 }
 
 static size_t used_size(const void *self)
 {
-    return sizeof(chain) - vi_structure_component_unused(&((const chain *)self)->body);
+    return sizeof(chain) - vi_body_unused(&((const chain *)self)->body);
 }
 
 VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "body/modal/structure/component.h"
+#include "body.h"
 #include "modes/chain_modes.h"
 
 /* All of a Chain's variables and state (variables.toml says what each is); copying it copies the Chain. */
@@ -24,7 +24,7 @@ typedef struct {
     /* outputs */
     double displacement[VI_MODES], velocity[VI_MODES], acceleration[VI_MODES], relative_acceleration[VI_MODES];
     double shape[VI_MODES][VI_MODES]; /* shape[i][j]: displacement of mass i for q_j = 1, kg^(-1/2) */
-    vi_structure_component body; /* last: its record is saved only as far as it is used, and nothing after that */
+    vi_body body; /* last: its record is saved only as far as it is used, and nothing after that */
 } chain;
 
 #endif

@@ -11,12 +11,12 @@ static void defaults(void *self)
 {
     oscillator *o = self;
     o->mass = o->stiffness = 1.0;
-    vi_structure_component_defaults(&o->body);
+    vi_body_defaults(&o->body);
 }
 
 static void sized(void *self, const char *block, int count)
 {
-    vi_structure_component_sized(&((oscillator *)self)->body, block, count);
+    vi_body_sized(&((oscillator *)self)->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -53,7 +53,7 @@ static bool parameters_are_good(const oscillator *o, char *message)
     check_forcing(o, message);
     vi_check_finite(message, "displacement_start", o->displacement_start);
     vi_check_finite(message, "velocity_start", o->velocity_start);
-    vi_structure_component_check(&o->body, message);
+    vi_body_check(&o->body, message);
     check_inputs(o, message);
     return message[0] == '\0';
 }
@@ -81,7 +81,7 @@ static void fill_model(oscillator *o)
     vi_structure_model *model = &o->body.model;
     const double root = sqrt(o->mass);
     model->modes = 1;
-    model->contacts = vi_structure_component_ports(&o->body);
+    model->contacts = vi_body_ports(&o->body);
     model->varies = vi_amplitude_acts(&o->amplitude);
     fill_mode(o, o->damping, o->stiffness);
     o->body.natural[0] = model->mode[0].natural;
@@ -111,7 +111,7 @@ static void follow_amplitude(oscillator *o)
 /* As an importer integrates it. */
 static vi_exchange_body exchange_body(oscillator *o)
 {
-    vi_exchange_body body = vi_structure_component_exchange(&o->body);
+    vi_exchange_body body = vi_body_exchange(&o->body);
     body.modes = 1;
     body.scale = sqrt(o->mass);
     body.refused = vi_amplitude_acts(&o->amplitude) ? "amplitude" : body.refused;
@@ -125,14 +125,14 @@ static void hold_inputs(oscillator *o)
     const double root = sqrt(o->mass);
     const double held[VI_MODES] = {o->force / root - root * o->body.base_acceleration};
     const double held_rate[VI_MODES] = {o->force_rate / root - root * o->body.base_acceleration_rate};
-    vi_structure_component_hold(&o->body, held, held_rate);
+    vi_body_hold(&o->body, held, held_rate);
 }
 
 static void drive(oscillator *o)
 {
     if (o->body.forcing_changed) {
         const double force[VI_MODES] = {modal_force(o)};
-        vi_structure_component_drive(&o->body, force);
+        vi_body_drive(&o->body, force);
     }
 }
 
@@ -140,7 +140,7 @@ static void refresh_inputs(oscillator *o)
 {
     drive(o);
     if (o->body.inputs_changed) {
-        vi_structure_component_take_impulses(&o->body);
+        vi_body_take_impulses(&o->body);
         hold_inputs(o);
     }
 }
@@ -149,9 +149,9 @@ static void update_outputs(void *self)
 {
     oscillator *o = self;
     refresh_inputs(o);
-    o->time = vi_structure_component_time(&o->body);
-    vi_structure_component_outputs(
-        &o->body, vi_structure_component_base_acceleration(&o->body, o->forcing_base_acceleration));
+    o->time = vi_body_time(&o->body);
+    vi_body_outputs(
+        &o->body, vi_body_base_acceleration(&o->body, o->forcing_base_acceleration));
     o->relative_acceleration = vi_structure_at(&o->body.model, o->body.model.observed, o->body.modal_acceleration);
     if (o->body.state.exchange.on) {
         const vi_exchange_body body = exchange_body(o);
@@ -166,7 +166,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
         return false;
     }
     fill_model(o);
-    if (!vi_structure_component_start(&o->body, start_time, "displacement_start", message)) {
+    if (!vi_body_start(&o->body, start_time, "displacement_start", message)) {
         return false;
     }
     hold_inputs(o);
@@ -181,14 +181,14 @@ static void was_set(void *self, uint32_t reference)
         || reference == OSCILLATOR_FORCING_ANGULAR_FREQUENCY) {
         o->body.forcing_changed = 1;
     }
-    vi_structure_component_was_set(&o->body, reference, OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+    vi_body_was_set(&o->body, reference, OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
                                    OSCILLATOR_RECORD_TAKEN);
 }
 
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     oscillator *o = self;
-    if (!vi_structure_component_resolve(&o->body, message)) {
+    if (!vi_body_resolve(&o->body, message)) {
         return false;
     }
     update_outputs(o);
@@ -200,7 +200,7 @@ static void check_drive(const oscillator *o, char *message)
 {
     if (o->body.forcing_changed) {
         check_forcing(o, message);
-        vi_structure_component_check_drive(&o->body, message);
+        vi_body_check_drive(&o->body, message);
     }
 }
 
@@ -211,16 +211,16 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     drive(o);
     check_inputs(o, message);
     check_drive(o, message);
-    if (!vi_structure_component_step_is_good(&o->body, request, &target, message)
-        || !vi_structure_component_resolve(&o->body, message)) {
+    if (!vi_body_step_is_good(&o->body, request, &target, message)
+        || !vi_body_resolve(&o->body, message)) {
         return VI_STEP_ERROR;
     }
-    if (!vi_structure_component_continues(&o->body)) {
-        vi_structure_component_take_impulses(&o->body);
+    if (!vi_body_continues(&o->body)) {
+        vi_body_take_impulses(&o->body);
         follow_amplitude(o);
         hold_inputs(o);
     }
-    const vi_step_result result = vi_structure_component_advance(&o->body, target, request, message);
+    const vi_step_result result = vi_body_advance(&o->body, target, request, message);
     update_outputs(o);
     return result;
 }
@@ -232,17 +232,17 @@ static bool event_pending(const void *self)
 
 static bool needs_events(const void *self)
 {
-    return vi_structure_component_needs_events(&((const oscillator *)self)->body);
+    return vi_body_needs_events(&((const oscillator *)self)->body);
 }
 
 static double present_time(const void *self)
 {
-    return vi_structure_component_time(&((const oscillator *)self)->body);
+    return vi_body_time(&((const oscillator *)self)->body);
 }
 
 static size_t used_size(const void *self)
 {
-    return sizeof(oscillator) - vi_structure_component_unused(&((const oscillator *)self)->body);
+    return sizeof(oscillator) - vi_body_unused(&((const oscillator *)self)->body);
 }
 
 VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);

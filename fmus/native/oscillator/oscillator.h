@@ -2,7 +2,7 @@
 #ifndef VIBROIMPACT_OSCILLATOR_H
 #define VIBROIMPACT_OSCILLATOR_H
 
-#include "body/modal/structure/component.h"
+#include "body.h"
 #include "motion/amplitude.h"
 
 /* All of an Oscillator's variables and state (variables.toml says what each is); copying it copies the Oscillator. */
@@ -17,7 +17,7 @@ typedef struct {
     double force, force_rate;
     /* outputs */
     double relative_acceleration;
-    vi_structure_component body; /* last: its record is saved only as far as it is used, and nothing after that */
+    vi_body body; /* last: its record is saved only as far as it is used, and nothing after that */
 } oscillator;
 
 #endif

@@ -4,8 +4,8 @@
  * Life: `defaults`; then at initialization the component checks its own parameters and `..._check`, fills `model` with
  * modes and shapes, sets the modal start state, and calls `..._start`; then `..._hold` whenever inputs were set.
  */
-#ifndef VIBROIMPACT_STRUCTURE_COMPONENT_H
-#define VIBROIMPACT_STRUCTURE_COMPONENT_H
+#ifndef VIBROIMPACT_BODY_H
+#define VIBROIMPACT_BODY_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -39,70 +39,70 @@ typedef struct {
     vi_record record;   /* it is saved only as far as it is used, and nothing after it */
     vi_pressed pressed; /* this and `scan` follow from the rest */
     vi_scan scan;
-} vi_structure_component;
+} vi_body;
 
-void vi_structure_component_defaults(vi_structure_component *c);
+void vi_body_defaults(vi_body *c);
 
 /* Parameters that all have: forcing's frequency and phase, the contacts' laws, tolerance, limit, shared inputs. */
-void vi_structure_component_check(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
+void vi_body_check(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 /* The model description has so many ports, or (`external_laws`, 0) no law that another component answers. */
-void vi_structure_component_sized(vi_structure_component *c, const char *block, int count);
+void vi_body_sized(vi_body *c, const char *block, int count);
 
 /* Number of ports that have to be followed: up to the last one with a law. */
-int vi_structure_component_ports(const vi_structure_component *c);
+int vi_body_ports(const vi_body *c);
 
 /* Modes, shapes, impulses, q, p are set: derive the rest, refuse a start beyond a stop (in the words `start_name`),
  * begin at `start_time`. */
-bool vi_structure_component_start(vi_structure_component *c, double start_time, const char *start_name,
+bool vi_body_start(vi_body *c, double start_time, const char *start_name,
                                   char message[VI_MESSAGE_LENGTH]);
 
 /* Give the body the impulses of its contacts, once; before new forces. */
-void vi_structure_component_take_impulses(vi_structure_component *c);
+void vi_body_take_impulses(vi_body *c);
 
 /* The forcing was tuned, and this is what it is for the modes: go on with it, where it is one that the body can go on with. */
-void vi_structure_component_drive(vi_structure_component *c, const double force[VI_MODES]);
+void vi_body_drive(vi_body *c, const double force[VI_MODES]);
 
 /* Complain of a tuned forcing that the body cannot go on with. */
-void vi_structure_component_check_drive(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
+void vi_body_check_drive(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Give the engine new modal input forces (from now on, with slopes). */
-void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],
+void vi_body_hold(vi_body *c, const double held[VI_MODES],
                                  const double held_rate[VI_MODES]);
 
 /* Acceleration of the base at the present instant, m/s^2: the input, and the forcing of this amplitude (m/s^2). */
-double vi_structure_component_base_acceleration(const vi_structure_component *c, double amplitude);
+double vi_body_base_acceleration(const vi_body *c, double amplitude);
 
 /* Recompute what is shared of the outputs. `base_acceleration`: absolute acceleration of the base, m/s^2. */
-void vi_structure_component_outputs(vi_structure_component *c, double base_acceleration);
+void vi_body_outputs(vi_body *c, double base_acceleration);
 
 /* Is the step one that can be made? Complains otherwise. */
-bool vi_structure_component_step_is_good(const vi_structure_component *c, const vi_step_request *request,
+bool vi_body_step_is_good(const vi_body *c, const vi_step_request *request,
                                          vi_instant *target, char message[VI_MESSAGE_LENGTH]);
 
 /* Resolve what is pending; false when the answer is missing or bad. */
-bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
+bool vi_body_resolve(vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Complains where the step is given up. */
-vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_instant target,
+vi_step_result vi_body_advance(vi_body *c, vi_instant target,
                                               const vi_step_request *request, char message[VI_MESSAGE_LENGTH]);
 
 /* Is the next step the rest of one that ended early for no reason of the motion, under the same inputs? Their slopes, and
  * what is found at the start of a step, then hold on. */
-bool vi_structure_component_continues(const vi_structure_component *c);
+bool vi_body_continues(const vi_body *c);
 
 /* A variable was set; `restitution` is the reference of contact[1].applied_restitution, `stride` the distance to that
  * of the next contact, `taken` the reference of record.taken. */
-void vi_structure_component_was_set(vi_structure_component *c, uint32_t reference, uint32_t restitution,
+void vi_body_was_set(vi_body *c, uint32_t reference, uint32_t restitution,
                                     uint32_t stride, uint32_t taken);
 
 /* The body as an importer integrates it, but for the form of its states. */
-vi_exchange_body vi_structure_component_exchange(vi_structure_component *c);
+vi_exchange_body vi_body_exchange(vi_body *c);
 
-bool vi_structure_component_needs_events(const vi_structure_component *c);
-double vi_structure_component_time(const vi_structure_component *c);
+bool vi_body_needs_events(const vi_body *c);
+double vi_body_time(const vi_body *c);
 
 /* Bytes at the end of the component that need not be saved. */
-size_t vi_structure_component_unused(const vi_structure_component *c);
+size_t vi_body_unused(const vi_body *c);
 
 #endif

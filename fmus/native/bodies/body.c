@@ -1,4 +1,4 @@
-#include "body/modal/structure/component.h"
+#include "body.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ static const double TIME_MISMATCH = 1e-9;
 static const double DEFAULT_TOLERANCE = 1e-10;
 static const double LOOSEST_TOLERANCE = 1e-2;
 
-void vi_structure_component_defaults(vi_structure_component *c)
+void vi_body_defaults(vi_body *c)
 {
     c->contact_tolerance = DEFAULT_TOLERANCE;
     c->contacts_described = VI_PORTS;
@@ -26,12 +26,12 @@ void vi_structure_component_defaults(vi_structure_component *c)
 }
 
 /* The engine's view of the parts. */
-static vi_structure parts_of(vi_structure_component *c)
+static vi_structure parts_of(vi_body *c)
 {
     return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan};
 }
 
-void vi_structure_component_sized(vi_structure_component *c, const char *block, int count)
+void vi_body_sized(vi_body *c, const char *block, int count)
 {
     if (strcmp(block, "contacts") == 0 && count >= 0 && count <= VI_PORTS) {
         c->contacts_described = count;
@@ -41,7 +41,7 @@ void vi_structure_component_sized(vi_structure_component *c, const char *block, 
     }
 }
 
-vi_exchange_body vi_structure_component_exchange(vi_structure_component *c)
+vi_exchange_body vi_body_exchange(vi_body *c)
 {
     return (vi_exchange_body){.parts = parts_of(c),
                               .contacts = c->contacts_described,
@@ -95,7 +95,7 @@ static void check_port_input(char *message, int k, const char *variable, double 
     }
 }
 
-static void check_inputs(const vi_structure_component *c, char *message)
+static void check_inputs(const vi_body *c, char *message)
 {
     vi_check_finite(message, "base_acceleration", c->base_acceleration);
     vi_check_finite(message, "base_acceleration_rate", c->base_acceleration_rate);
@@ -107,7 +107,7 @@ static void check_inputs(const vi_structure_component *c, char *message)
     }
 }
 
-void vi_structure_component_check(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
+void vi_body_check(const vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     vi_check_not_negative(message, "forcing.angular_frequency", c->forcing_angular_frequency);
     vi_check_finite(message, "forcing.phase", c->forcing_phase);
@@ -126,7 +126,7 @@ void vi_structure_component_check(const vi_structure_component *c, char message[
     check_inputs(c, message);
 }
 
-int vi_structure_component_ports(const vi_structure_component *c)
+int vi_body_ports(const vi_body *c)
 {
     int ports = VI_PORTS;
     while (ports > 0 && vi_contact_law_is_none(c->contacts[ports - 1].law.law)) {
@@ -165,7 +165,7 @@ static void check_pair(const vi_contact contacts[], int i, int j, char *message)
 
 /* Contacts i and j are at the same point of the body when their shapes are equal. Complain where such stops leave no
  * room, or where a rigid one hides the one behind it. */
-static void check_points(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
+static void check_points(const vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     for (int j = 1; j < c->model.contacts; ++j) {
         for (int i = 0; i < j; ++i) {
@@ -180,7 +180,7 @@ static void check_points(const vi_structure_component *c, char message[VI_MESSAG
 
 /* ---- life ---- */
 
-static double lowest_natural(const vi_structure_component *c)
+static double lowest_natural(const vi_body *c)
 {
     for (int j = 0; j < c->model.modes; ++j) {
         if (c->natural[j] > 0.0) {
@@ -190,7 +190,7 @@ static double lowest_natural(const vi_structure_component *c)
     return 0.0;
 }
 
-static bool start_clock(vi_structure_component *c, double start_time, vi_instant *now, char *message)
+static bool start_clock(vi_body *c, double start_time, vi_instant *now, char *message)
 {
     vi_clock *clock = &c->model.clock;
     if (vi_clock_start(clock, c->forcing_angular_frequency, c->forcing_phase, lowest_natural(c))
@@ -202,7 +202,7 @@ static bool start_clock(vi_structure_component *c, double start_time, vi_instant
     return false;
 }
 
-static bool starts_free(vi_structure_component *c, const char *start_name, char *message)
+static bool starts_free(vi_body *c, const char *start_name, char *message)
 {
     const vi_structure parts = parts_of(c);
     const int beyond = vi_structure_beyond(&parts);
@@ -216,7 +216,7 @@ static bool starts_free(vi_structure_component *c, const char *start_name, char 
     return false;
 }
 
-bool vi_structure_component_start(vi_structure_component *c, double start_time, const char *start_name,
+bool vi_body_start(vi_body *c, double start_time, const char *start_name,
                                   char message[VI_MESSAGE_LENGTH])
 {
     for (int k = 0; k < VI_PORTS; ++k) {
@@ -236,13 +236,13 @@ bool vi_structure_component_start(vi_structure_component *c, double start_time, 
     return true;
 }
 
-void vi_structure_component_take_impulses(vi_structure_component *c)
+void vi_body_take_impulses(vi_body *c)
 {
     const vi_structure parts = parts_of(c);
     vi_structure_take_impulses(&parts);
 }
 
-void vi_structure_component_drive(vi_structure_component *c, const double force[VI_MODES])
+void vi_body_drive(vi_body *c, const double force[VI_MODES])
 {
     bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
     for (int j = 0; j < c->model.modes; ++j) {
@@ -255,14 +255,14 @@ void vi_structure_component_drive(vi_structure_component *c, const double force[
     }
 }
 
-void vi_structure_component_check_drive(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
+void vi_body_check_drive(const vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     if (c->forcing_changed) {
         vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency, c->state.now);
     }
 }
 
-void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],
+void vi_body_hold(vi_body *c, const double held[VI_MODES],
                                  const double held_rate[VI_MODES])
 {
     const vi_structure parts = parts_of(c);
@@ -271,12 +271,12 @@ void vi_structure_component_hold(vi_structure_component *c, const double held[VI
     c->inputs_changed = 0;
 }
 
-bool vi_structure_component_continues(const vi_structure_component *c)
+bool vi_body_continues(const vi_body *c)
 {
     return c->state.budget.unfinished && !c->inputs_changed;
 }
 
-void vi_structure_component_was_set(vi_structure_component *c, uint32_t reference, uint32_t restitution,
+void vi_body_was_set(vi_body *c, uint32_t reference, uint32_t restitution,
                                     uint32_t stride, uint32_t taken)
 {
     const uint32_t from_first = reference - restitution; /* wraps to a large number below the first */
@@ -293,26 +293,26 @@ void vi_structure_component_was_set(vi_structure_component *c, uint32_t referenc
 
 /* ---- outputs ---- */
 
-double vi_structure_component_time(const vi_structure_component *c)
+double vi_body_time(const vi_body *c)
 {
     return vi_clock_time(&c->model.clock, c->state.now);
 }
 
 /* cos of the force's phase at the present instant; of forcing_phase when it is constant. */
-static double cosine_of_forcing(const vi_structure_component *c)
+static double cosine_of_forcing(const vi_body *c)
 {
     const double w = c->model.clock.angular_frequency;
     return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
 }
 
-double vi_structure_component_base_acceleration(const vi_structure_component *c, double amplitude)
+double vi_body_base_acceleration(const vi_body *c, double amplitude)
 {
     const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
     const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
     return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
 }
 
-static void update_energies(vi_structure_component *c)
+static void update_energies(vi_body *c)
 {
     c->energy_kinetic = c->energy_potential = 0.0;
     for (int j = 0; j < c->model.modes; ++j) {
@@ -323,7 +323,7 @@ static void update_energies(vi_structure_component *c)
     }
 }
 
-void vi_structure_component_outputs(vi_structure_component *c, double base_acceleration)
+void vi_body_outputs(vi_body *c, double base_acceleration)
 {
     const vi_structure parts = parts_of(c);
     vi_structure_outputs(&parts, c->modal_acceleration);
@@ -335,7 +335,7 @@ void vi_structure_component_outputs(vi_structure_component *c, double base_accel
 
 /* ---- steps ---- */
 
-static void check_passed(const vi_structure_component *c, char *message)
+static void check_passed(const vi_body *c, char *message)
 {
     const int passed = c->state.passed;
     if (passed) {
@@ -345,13 +345,13 @@ static void check_passed(const vi_structure_component *c, char *message)
     }
 }
 
-bool vi_structure_component_step_is_good(const vi_structure_component *c, const vi_step_request *request,
+bool vi_body_step_is_good(const vi_body *c, const vi_step_request *request,
                                          vi_instant *target, char message[VI_MESSAGE_LENGTH])
 {
     if (!(request->size > 0.0) || !isfinite(request->size)) {
         vi_complain(message, "communicationStepSize: expected a finite number > 0, got %.17g", request->size);
     }
-    const double now = vi_structure_component_time(c);
+    const double now = vi_body_time(c);
     if (!(fabs(request->time - now) <= TIME_MISMATCH * (1.0 + fabs(now)))) {
         vi_complain(message, "currentCommunicationPoint: expected %.17g (the end of the last step), got %.17g", now,
                     request->time);
@@ -369,7 +369,7 @@ bool vi_structure_component_step_is_good(const vi_structure_component *c, const 
 }
 
 /* A stop that answers with a force has answered once its importer goes on: the force follows by the inputs. */
-static void check_answer(const vi_structure_component *c, int k, char *message)
+static void check_answer(const vi_body *c, int k, char *message)
 {
     const vi_contact *contact = &c->contacts[k];
     const double r = contact->applied_restitution;
@@ -380,7 +380,7 @@ static void check_answer(const vi_structure_component *c, int k, char *message)
     }
 }
 
-bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
+bool vi_body_resolve(vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     if (!c->state.pending) {
         return true;
@@ -398,7 +398,7 @@ bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_M
     return true;
 }
 
-vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_instant target,
+vi_step_result vi_body_advance(vi_body *c, vi_instant target,
                                               const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     const vi_structure parts = parts_of(c);
@@ -407,11 +407,11 @@ vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_inst
     if (result == VI_STEP_STANDSTILL) {
         vi_structure_complain(&parts, message);
     }
-    vi_complain_of_end(message, result, vi_structure_component_time(c));
+    vi_complain_of_end(message, result, vi_body_time(c));
     return result;
 }
 
-bool vi_structure_component_needs_events(const vi_structure_component *c)
+bool vi_body_needs_events(const vi_body *c)
 {
     for (int k = 0; k < VI_PORTS; ++k) {
         if (vi_contact_law_asks(c->contacts[k].law.law)) {
@@ -421,7 +421,7 @@ bool vi_structure_component_needs_events(const vi_structure_component *c)
     return false;
 }
 
-size_t vi_structure_component_unused(const vi_structure_component *c)
+size_t vi_body_unused(const vi_body *c)
 {
     return vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan;
 }
