@@ -5,11 +5,9 @@
 #include <string.h>
 
 #include "beam_variables.h"
-#include "component.h"
 #include "modes/beam_modes.h"
 
 enum { START_MODES = 4 };
-enum { STRIDE = BEAM_CONTACT_APPLIED_RESTITUTION_2 - BEAM_CONTACT_APPLIED_RESTITUTION_1 };
 
 /* Estimated relative error of a natural frequency above which the theory is left. equations.md 6.7 */
 static const double VALIDITY_LIMIT = 0.02;
@@ -40,7 +38,6 @@ static void defaults(void *self)
     for (int k = 0; k < BEAM_SENSORS; ++k) {
         b->sensor[k].location = 1.0;
     }
-    vi_body_defaults(&b->body);
 }
 
 static void sized(void *self, const char *block, int count)
@@ -49,7 +46,6 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "modes") == 0 && count >= 1 && count <= VI_MODES) {
         b->modes = b->modes_described = count;
     }
-    vi_body_sized(&b->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -105,10 +101,15 @@ static void check_modes(const beam *b, char *message)
     vi_check_each(message, vi_check_finite, "modal_velocity_start", b->modal_velocity_start, n);
 }
 
+static void check_amplitude(const void *self, char message[VI_MESSAGE_LENGTH])
+{
+    vi_check_finite(message, "forcing.amplitude", ((const beam *)self)->forcing_amplitude);
+}
+
 static void check_forcing(const beam *b, char *message)
 {
     check_choice(message, "forcing.kind", b->forcing_kind, FORCED_BY_BASE);
-    vi_check_finite(message, "forcing.amplitude", b->forcing_amplitude);
+    check_amplitude(b, message);
     if (b->forcing_kind == FORCED_AS_MODE && (b->forcing_mode < 1 || b->forcing_mode > b->modes)) {
         vi_complain(message, "forcing.mode: expected 1 to %lld (modes), got %lld", (long long)b->modes,
                     (long long)b->forcing_mode);
@@ -132,8 +133,9 @@ static void check_places(const beam *b, char *message)
     }
 }
 
-static void check_inputs(const beam *b, char *message)
+static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
 {
+    const beam *b = self;
     vi_check_finite(message, "force", b->force);
     vi_check_finite(message, "force_rate", b->force_rate);
 }
@@ -343,9 +345,13 @@ static void set_mode(beam *b, int j, double natural, double ratio)
     vi_structure_mode(&b->body.model, j, natural, ratio, modal_amplitude(b, j), b->body.forcing_angular_frequency);
 }
 
-/* Modes as they are at the present amplitudes, until the next step. */
-static void follow_amplitudes(beam *b)
+/* Nothing where no mode depends on its amplitude. */
+static void follow_amplitudes(void *self)
 {
+    beam *b = self;
+    if (!b->depends_on_amplitude) {
+        return;
+    }
     for (int j = 0; j < b->modes; ++j) {
         const double natural = b->body.natural[j];
         const double a = vi_amplitude_of(b->body.state.q[j], b->body.state.p[j], natural) / b->root_mass;
@@ -403,8 +409,9 @@ static bool fill_model(beam *b, char *message)
 }
 
 /* Say which is the first mode that Euler-Bernoulli's theory does not hold for. */
-static void warn_of_validity(const beam *b, char *message)
+static void warn_of_validity(const void *self, char message[VI_MESSAGE_LENGTH])
 {
+    const beam *b = self;
     if (b->flexural_rigidity > 0.0 && b->mass_per_length > 0.0) {
         return; /* the section is not known */
     }
@@ -422,58 +429,40 @@ static void warn_of_validity(const beam *b, char *message)
     }
 }
 
+static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
+{
+    return parameters_are_good(self, message) && fill_model(self, message);
+}
+
 /* ---- life ---- */
 
-static void hold_inputs(beam *b)
+static void find_forcing(const void *self, double force[VI_MODES])
 {
-    double held[VI_MODES], held_rate[VI_MODES];
+    const beam *b = self;
+    for (int j = 0; j < b->modes; ++j) {
+        force[j] = modal_amplitude(b, j);
+    }
+}
+
+static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
+{
+    const beam *b = self;
     for (int j = 0; j < b->modes; ++j) {
         held[j] = b->force * b->forced_shape[j] - b->body.base_acceleration * b->participation[j];
         held_rate[j] = b->force_rate * b->forced_shape[j] - b->body.base_acceleration_rate * b->participation[j];
     }
-    vi_body_hold(&b->body, held, held_rate);
 }
 
-static void drive(beam *b)
+static double base_forcing(const void *self)
 {
-    double force[VI_MODES];
-    if (!b->body.forcing_changed) {
-        return;
-    }
-    for (int j = 0; j < b->modes; ++j) {
-        force[j] = modal_amplitude(b, j);
-    }
-    vi_body_drive(&b->body, force);
+    const beam *b = self;
+    return b->forcing_kind == FORCED_BY_BASE ? b->forcing_amplitude : 0.0;
 }
 
-static void refresh_inputs(beam *b)
-{
-    drive(b);
-    if (b->body.inputs_changed) {
-        vi_body_take_impulses(&b->body);
-        hold_inputs(b);
-    }
-}
-
-/* As an importer integrates it: its states are those of the modes. */
-static vi_exchange_body exchange_body(beam *b)
-{
-    vi_exchange_body body = vi_body_exchange(&b->body);
-    body.modes = (int)b->modes_described;
-    body.scale = b->root_mass;
-    body.refused = b->depends_on_amplitude ? "amplitude" : body.refused;
-    return body;
-}
-
-static void update_outputs(void *self)
+static void update_outputs(void *self, double base_acceleration)
 {
     beam *b = self;
-    refresh_inputs(b);
-    b->time = vi_body_time(&b->body);
     const vi_body *body = &b->body;
-    const double moved = b->forcing_kind == FORCED_BY_BASE ? b->forcing_amplitude : 0.0;
-    const double base = vi_body_base_acceleration(&b->body, moved);
-    vi_body_outputs(&b->body, base);
     for (int j = 0; j < b->modes; ++j) {
         b->modal_displacement[j] = body->state.q[j] / b->root_mass;
         b->modal_velocity[j] = body->state.p[j] / b->root_mass;
@@ -483,112 +472,35 @@ static void update_outputs(void *self)
         beam_sensor *sensor = &b->sensor[k];
         sensor->displacement = vi_structure_at(&body->model, sensor->shape, body->state.q);
         sensor->velocity = vi_structure_at(&body->model, sensor->shape, body->state.p);
-        sensor->acceleration = vi_structure_at(&body->model, sensor->shape, body->modal_acceleration) + base;
-    }
-    if (body->state.exchange.on) {
-        const vi_exchange_body integrated = exchange_body(b);
-        vi_exchange_show_indicators(&integrated);
+        sensor->acceleration = vi_structure_at(&body->model, sensor->shape, body->modal_acceleration) + base_acceleration;
     }
 }
 
-static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+/* Its states are those of the modes. */
+static void show_states(void *self, vi_exchange_body *body)
 {
-    beam *b = self;
-    if (!parameters_are_good(b, message) || !fill_model(b, message)
-        || !vi_body_start(&b->body, start_time, "modal_displacement_start", message)) {
-        return false;
-    }
-    hold_inputs(b);
-    update_outputs(b);
-    warn_of_validity(b, message);
-    return true;
+    const beam *b = self;
+    body->modes = (int)b->modes_described;
+    body->scale = b->root_mass;
+    body->refused = b->depends_on_amplitude ? "amplitude" : NULL;
 }
 
-static void was_set(void *self, uint32_t reference)
-{
-    beam *b = self;
-    if (reference == BEAM_FORCING_AMPLITUDE || reference == BEAM_FORCING_ANGULAR_FREQUENCY) {
-        b->body.forcing_changed = 1;
-    }
-    vi_body_was_set(&b->body, reference, BEAM_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
-                                   BEAM_RECORD_TAKEN);
-}
-
-static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
-{
-    beam *b = self;
-    if (!vi_body_resolve(&b->body, message)) {
-        return false;
-    }
-    update_outputs(b);
-    return true;
-}
-
-/* Of a tuned forcing that the body has not gone on with. */
-static void check_drive(const beam *b, char *message)
-{
-    if (b->body.forcing_changed) {
-        vi_check_finite(message, "forcing.amplitude", b->forcing_amplitude);
-        vi_body_check_drive(&b->body, message);
-    }
-}
-
-static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
-{
-    beam *b = self;
-    vi_instant target;
-    drive(b);
-    check_inputs(b, message);
-    check_drive(b, message);
-    if (!vi_body_step_is_good(&b->body, request, &target, message)
-        || !vi_body_resolve(&b->body, message)) {
-        return VI_STEP_ERROR;
-    }
-    if (!vi_body_continues(&b->body)) {
-        vi_body_take_impulses(&b->body);
-        if (b->depends_on_amplitude) {
-            follow_amplitudes(b);
-        }
-        hold_inputs(b);
-    }
-    const vi_step_result result = vi_body_advance(&b->body, target, request, message);
-    update_outputs(b);
-    return result;
-}
-
-static bool event_pending(const void *self)
-{
-    return ((const beam *)self)->body.state.pending != 0;
-}
-
-static bool needs_events(const void *self)
-{
-    return vi_body_needs_events(&((const beam *)self)->body);
-}
-
-static double present_time(const void *self)
-{
-    return vi_body_time(&((const beam *)self)->body);
-}
-
-static size_t used_size(const void *self)
-{
-    return sizeof(beam) - vi_body_unused(&((const beam *)self)->body);
-}
-
-VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
-
-const vi_component vi_this_component = {
+const vi_body_form vi_this_body = {
+    .place = offsetof(beam, body),
+    .restitution = BEAM_CONTACT_APPLIED_RESTITUTION_1,
+    .stride = BEAM_CONTACT_APPLIED_RESTITUTION_2 - BEAM_CONTACT_APPLIED_RESTITUTION_1,
+    .taken = BEAM_RECORD_TAKEN,
+    .start = "modal_displacement_start",
     .defaults = defaults,
-    .initialize = initialize,
-    .was_set = was_set,
-    .update_outputs = update_outputs,
-    .step = step,
-    .resolve = resolve,
-    .event_pending = event_pending,
-    .needs_events = needs_events,
-    .time = present_time,
-    .used_size = used_size,
     .sized = sized,
-    .exchange = &exchange,
+    .prepare = prepare,
+    .warn = warn_of_validity,
+    .check_inputs = check_inputs,
+    .check_forcing = check_amplitude,
+    .find_forcing = find_forcing,
+    .find_inputs = find_inputs,
+    .follow_amplitudes = follow_amplitudes,
+    .base_forcing = base_forcing,
+    .update_outputs = update_outputs,
+    .show_states = show_states,
 };

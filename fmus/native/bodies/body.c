@@ -1,20 +1,36 @@
 #include "body.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-#include "body/law_check.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
+#include "body_check.h"
+#include "body_exchange.h"
 
-/* An importer's communication point may differ from the body's own time by this times (1 + |time|), s. */
-static const double TIME_MISMATCH = 1e-9;
+static const vi_body_form *const form = &vi_this_body;
+
 static const double DEFAULT_TOLERANCE = 1e-10;
-static const double LOOSEST_TOLERANCE = 1e-2;
 
-void vi_body_defaults(vi_body *c)
+vi_body *vi_body_of(void *self)
 {
+    return (vi_body *)(void *)((char *)self + form->place);
+}
+
+static const vi_body *const_body_of(const void *self)
+{
+    return (const vi_body *)(const void *)((const char *)self + form->place);
+}
+
+vi_structure vi_body_parts(vi_body *c)
+{
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan};
+}
+
+static void defaults(void *self)
+{
+    vi_body *c = vi_body_of(self);
+    form->defaults(self);
     c->contact_tolerance = DEFAULT_TOLERANCE;
     c->contacts_described = VI_PORTS;
     for (int k = 0; k < VI_PORTS; ++k) {
@@ -25,105 +41,19 @@ void vi_body_defaults(vi_body *c)
     }
 }
 
-/* The engine's view of the parts. */
-static vi_structure parts_of(vi_body *c)
+/* The model description has so many ports, or (`external_laws`, 0) no law that another component answers. */
+static void sized(void *self, const char *block, int count)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan};
-}
-
-void vi_body_sized(vi_body *c, const char *block, int count)
-{
+    vi_body *c = vi_body_of(self);
+    if (form->sized != NULL) {
+        form->sized(self, block, count);
+    }
     if (strcmp(block, "contacts") == 0 && count >= 0 && count <= VI_PORTS) {
         c->contacts_described = count;
     }
     if (strcmp(block, "external_laws") == 0) {
         c->external_hidden = count == 0;
     }
-}
-
-vi_exchange_body vi_body_exchange(vi_body *c)
-{
-    return (vi_exchange_body){.parts = parts_of(c),
-                              .contacts = c->contacts_described,
-                              .scale = 1.0,
-                              .refused = c->record_energies ? "record.energies" : NULL};
-}
-
-/* ---- validation ---- */
-
-typedef struct {
-    char text[48];
-} port_name;
-
-static port_name name_of(int k, const char *variable)
-{
-    port_name name;
-    (void)snprintf(name.text, sizeof name.text, "contact[%d].%s", k + 1, variable);
-    return name;
-}
-
-static bool is_inside(int64_t law)
-{
-    return vi_contact_law_exists(law) && !vi_contact_law_is_external(law);
-}
-
-static void check_contact(char *message, int k, const vi_contact *contact, bool external_hidden)
-{
-    const vi_contact_law *law = &contact->law;
-    const port_name port = name_of(k, "");
-    if (!vi_contact_law_exists(law->law)) {
-        vi_complain_of_law(message, name_of(k, "law").text, "", external_hidden ? is_inside : vi_contact_law_exists,
-                           law->law);
-    }
-    if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
-        vi_complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", k + 1,
-                    (long long)contact->side);
-    }
-    vi_check_finite(message, name_of(k, "position").text, contact->position);
-    vi_check_law_rules(message, port.text, law, vi_impact_rules);
-    vi_check_not_negative(message, name_of(k, "relaxation_time").text, contact->relaxation_time);
-    if (vi_contact_law_yields(law->law)) {
-        vi_check_law_rules(message, port.text, law, vi_law_of(law->law)->rules);
-    }
-}
-
-/* The name is written only where it is needed: inputs are checked in every step. */
-static void check_port_input(char *message, int k, const char *variable, double value)
-{
-    if (!isfinite(value)) {
-        vi_check_finite(message, name_of(k, variable).text, value);
-    }
-}
-
-static void check_inputs(const vi_body *c, char *message)
-{
-    vi_check_finite(message, "base_acceleration", c->base_acceleration);
-    vi_check_finite(message, "base_acceleration_rate", c->base_acceleration_rate);
-    for (int k = 0; k < VI_PORTS; ++k) {
-        check_port_input(message, k, "applied_force", c->contacts[k].applied_force);
-        check_port_input(message, k, "applied_stiffness", c->contacts[k].applied_stiffness);
-        check_port_input(message, k, "applied_damping", c->contacts[k].applied_damping);
-        check_port_input(message, k, "applied_impulse", c->contacts[k].applied_impulse);
-    }
-}
-
-void vi_body_check(const vi_body *c, char message[VI_MESSAGE_LENGTH])
-{
-    vi_check_not_negative(message, "forcing.angular_frequency", c->forcing_angular_frequency);
-    vi_check_finite(message, "forcing.phase", c->forcing_phase);
-    for (int k = 0; k < VI_PORTS; ++k) {
-        if (!vi_contact_law_is_none(c->contacts[k].law.law)) {
-            check_contact(message, k, &c->contacts[k], c->external_hidden);
-        }
-    }
-    if (!(c->contact_tolerance > 0.0 && c->contact_tolerance <= LOOSEST_TOLERANCE)) {
-        vi_complain(message, "contact_tolerance: expected 0 < tolerance <= %g, got %.17g", LOOSEST_TOLERANCE,
-                    c->contact_tolerance);
-    }
-    if (c->model.impact_limit < 0) {
-        vi_complain(message, "impact_limit: expected >= 0, got %lld", (long long)c->model.impact_limit);
-    }
-    check_inputs(c, message);
 }
 
 int vi_body_ports(const vi_body *c)
@@ -135,50 +65,124 @@ int vi_body_ports(const vi_body *c)
     return ports;
 }
 
-static bool at_one_point(const vi_structure_model *model, int i, int j)
-{
-    return memcmp(model->shape[i], model->shape[j], (size_t)vi_structure_modes(model) * sizeof(double)) == 0;
-}
+/* ---- inputs ---- */
 
-/* Does the body meet stop i first, for good? A rigid one is never passed. */
-static bool hides(const vi_contact *i, const vi_contact *j)
+static void drive(void *self, vi_body *c)
 {
-    return vi_contact_law_is_rigid(i->law.law)
-           && vi_contact_direction(i->side) * (j->position - i->position) >= 0.0;
-}
-
-static void check_pair(const vi_contact contacts[], int i, int j, char *message)
-{
-    const vi_contact *a = &contacts[i], *b = &contacts[j];
-    if (a->side != b->side) {
-        if (!(vi_contact_direction(a->side) * (a->position - b->position) > 0.0)) {
-            vi_complain(message, "contact[%d].position: expected room between it and contact[%d] on the other side of"
-                                 " the same point, got %.17g and %.17g", j + 1, i + 1, b->position, a->position);
-        }
-    } else if (hides(a, b) || hides(b, a)) {
-        const int front = hides(a, b) ? i : j, behind = front == i ? j : i;
-        vi_complain(message, "contact[%d].position: expected a position that the rigid contact[%d] (%.17g) on the same"
-                             " side of the same point does not hide, got %.17g", behind + 1, front + 1,
-                    contacts[front].position, contacts[behind].position);
+    double force[VI_MODES];
+    if (!c->forcing_changed) {
+        return;
+    }
+    form->find_forcing(self, force);
+    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
+    for (int j = 0; j < vi_structure_modes(&c->model); ++j) {
+        good = good && isfinite(force[j]);
+    }
+    if (good) {
+        const vi_structure parts = vi_body_parts(c);
+        vi_structure_drive(&parts, force, c->forcing_angular_frequency);
+        c->forcing_changed = 0;
     }
 }
 
-/* Contacts i and j are at the same point of the body when their shapes are equal. Complain where such stops leave no
- * room, or where a rigid one hides the one behind it. */
-static void check_points(const vi_body *c, char message[VI_MESSAGE_LENGTH])
+/* Impulses of the contacts come before new forces. */
+static void take_impulses(vi_body *c)
 {
-    for (int j = 1; j < c->model.contacts; ++j) {
-        for (int i = 0; i < j; ++i) {
-            const bool both = vi_contact_law_has_stop(c->contacts[i].law.law)
-                              && vi_contact_law_has_stop(c->contacts[j].law.law);
-            if (both && at_one_point(&c->model, i, j)) {
-                check_pair(c->contacts, i, j, message);
-            }
-        }
+    const vi_structure parts = vi_body_parts(c);
+    vi_structure_take_impulses(&parts);
+}
+
+static void hold_inputs(void *self, vi_body *c)
+{
+    double held[VI_MODES], held_rate[VI_MODES];
+    const vi_structure parts = vi_body_parts(c);
+    form->find_inputs(self, held, held_rate);
+    vi_structure_hold(&parts, held, held_rate);
+    vi_structure_meet_forces(&parts);
+    c->inputs_changed = 0;
+}
+
+void vi_body_refresh_inputs(void *self)
+{
+    vi_body *c = vi_body_of(self);
+    drive(self, c);
+    if (c->inputs_changed) {
+        take_impulses(c);
+        hold_inputs(self, c);
     }
 }
 
-/* ---- life ---- */
+static void was_set(void *self, uint32_t reference)
+{
+    vi_body *c = vi_body_of(self);
+    const uint32_t from_first = reference - form->restitution; /* wraps to a large number below the first */
+    if (vi_this_description.variables[reference].access == VI_SET_TUNABLE) {
+        c->forcing_changed = 1;
+    }
+    if (reference == form->taken) {
+        vi_record_take(&c->record);
+        return;
+    }
+    c->inputs_changed = 1;
+    vi_record_switched(&c->record);
+    if (from_first % form->stride == 0 && from_first / form->stride < VI_PORTS) {
+        c->contacts[from_first / form->stride].answered = 1;
+    }
+}
+
+/* ---- outputs ---- */
+
+static double present_time(const void *self)
+{
+    const vi_body *c = const_body_of(self);
+    return vi_clock_time(&c->model.clock, c->state.now);
+}
+
+/* cos of the force's phase at the present instant; of forcing_phase when it is constant. */
+static double cosine_of_forcing(const vi_body *c)
+{
+    const double w = c->model.clock.angular_frequency;
+    return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
+}
+
+/* Acceleration of the base at the present instant, m/s^2: the input, and the forcing of this amplitude (m/s^2). */
+static double base_acceleration(const vi_body *c, double amplitude)
+{
+    const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
+    const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
+    return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
+}
+
+static void update_energies(vi_body *c)
+{
+    c->energy_kinetic = c->energy_potential = 0.0;
+    for (int j = 0; j < c->model.modes; ++j) {
+        const double p = c->state.p[j], stretch = c->natural[j] * c->state.q[j];
+        c->energy_kinetic += 0.5 * p * p;
+        c->energy_potential += 0.5 * stretch * stretch;
+        c->modal_energy[j] = c->record_energies ? 0.5 * (p * p + stretch * stretch) : 0.0;
+    }
+}
+
+static void update_outputs(void *self)
+{
+    vi_body *c = vi_body_of(self);
+    vi_body_refresh_inputs(self);
+    *(double *)(void *)((char *)self + vi_this_description.time) = present_time(self);
+    const double base = base_acceleration(c, form->base_forcing(self));
+    const vi_structure parts = vi_body_parts(c);
+    vi_structure_outputs(&parts, c->modal_acceleration);
+    c->displacement = vi_structure_observed(&parts);
+    c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
+    c->acceleration = vi_structure_at(&c->model, c->model.observed, c->modal_acceleration) + base;
+    update_energies(c);
+    form->update_outputs(self, base);
+    if (c->state.exchange.on) {
+        vi_body_show_indicators(self);
+    }
+}
+
+/* ---- start ---- */
 
 static double lowest_natural(const vi_body *c)
 {
@@ -202,22 +206,21 @@ static bool start_clock(vi_body *c, double start_time, vi_instant *now, char *me
     return false;
 }
 
-static bool starts_free(vi_body *c, const char *start_name, char *message)
+static bool starts_free(vi_body *c, char *message)
 {
-    const vi_structure parts = parts_of(c);
+    const vi_structure parts = vi_body_parts(c);
     const int beyond = vi_structure_beyond(&parts);
     if (beyond == 0) {
         return true;
     }
     const vi_contact *contact = &c->contacts[beyond - 1];
-    vi_complain(message, "%s: expected a start on the free side of contact[%d] (%s %.17g), got %.17g there", start_name,
+    vi_complain(message, "%s: expected a start on the free side of contact[%d] (%s %.17g), got %.17g there", form->start,
                 beyond, contact->side == VI_SIDE_UPPER ? "<=" : ">=", contact->position,
                 vi_structure_at(&c->model, c->model.shape[beyond - 1], c->state.q));
     return false;
 }
 
-bool vi_body_start(vi_body *c, double start_time, const char *start_name,
-                                  char message[VI_MESSAGE_LENGTH])
+static bool start(vi_body *c, double start_time, char *message)
 {
     for (int k = 0; k < VI_PORTS; ++k) {
         vi_contact_clear(&c->contacts[k]);
@@ -226,202 +229,138 @@ bool vi_body_start(vi_body *c, double start_time, const char *start_name,
     c->forcing_changed = 0;
     c->model.tolerance = c->contact_tolerance;
     vi_structure_prepare(&c->model);
-    check_points(c, message);
+    vi_body_check_points(c, message);
     vi_instant now;
-    if (!start_clock(c, start_time, &now, message) || !starts_free(c, start_name, message) || message[0] != '\0') {
+    if (!start_clock(c, start_time, &now, message) || !starts_free(c, message) || message[0] != '\0') {
         return false;
     }
-    const vi_structure parts = parts_of(c);
+    const vi_structure parts = vi_body_parts(c);
     vi_structure_start(&parts, now);
     return true;
 }
 
-void vi_body_take_impulses(vi_body *c)
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
-    const vi_structure parts = parts_of(c);
-    vi_structure_take_impulses(&parts);
-}
-
-void vi_body_drive(vi_body *c, const double force[VI_MODES])
-{
-    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
-    for (int j = 0; j < c->model.modes; ++j) {
-        good = good && isfinite(force[j]);
+    vi_body *c = vi_body_of(self);
+    if (!form->prepare(self, message) || !start(c, start_time, message)) {
+        return false;
     }
-    if (good) {
-        const vi_structure parts = parts_of(c);
-        vi_structure_drive(&parts, force, c->forcing_angular_frequency);
-        c->forcing_changed = 0;
+    hold_inputs(self, c);
+    update_outputs(self);
+    if (form->warn != NULL) {
+        form->warn(self, message);
     }
-}
-
-void vi_body_check_drive(const vi_body *c, char message[VI_MESSAGE_LENGTH])
-{
-    if (c->forcing_changed) {
-        vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency, c->state.now);
-    }
-}
-
-void vi_body_hold(vi_body *c, const double held[VI_MODES],
-                                 const double held_rate[VI_MODES])
-{
-    const vi_structure parts = parts_of(c);
-    vi_structure_hold(&parts, held, held_rate);
-    vi_structure_meet_forces(&parts);
-    c->inputs_changed = 0;
-}
-
-bool vi_body_continues(const vi_body *c)
-{
-    return c->state.budget.unfinished && !c->inputs_changed;
-}
-
-void vi_body_was_set(vi_body *c, uint32_t reference, uint32_t restitution,
-                                    uint32_t stride, uint32_t taken)
-{
-    const uint32_t from_first = reference - restitution; /* wraps to a large number below the first */
-    if (reference == taken) {
-        vi_record_take(&c->record);
-        return;
-    }
-    c->inputs_changed = 1;
-    vi_record_switched(&c->record);
-    if (from_first % stride == 0 && from_first / stride < VI_PORTS) {
-        c->contacts[from_first / stride].answered = 1;
-    }
-}
-
-/* ---- outputs ---- */
-
-double vi_body_time(const vi_body *c)
-{
-    return vi_clock_time(&c->model.clock, c->state.now);
-}
-
-/* cos of the force's phase at the present instant; of forcing_phase when it is constant. */
-static double cosine_of_forcing(const vi_body *c)
-{
-    const double w = c->model.clock.angular_frequency;
-    return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
-}
-
-double vi_body_base_acceleration(const vi_body *c, double amplitude)
-{
-    const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
-    const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
-    return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
-}
-
-static void update_energies(vi_body *c)
-{
-    c->energy_kinetic = c->energy_potential = 0.0;
-    for (int j = 0; j < c->model.modes; ++j) {
-        const double p = c->state.p[j], stretch = c->natural[j] * c->state.q[j];
-        c->energy_kinetic += 0.5 * p * p;
-        c->energy_potential += 0.5 * stretch * stretch;
-        c->modal_energy[j] = c->record_energies ? 0.5 * (p * p + stretch * stretch) : 0.0;
-    }
-}
-
-void vi_body_outputs(vi_body *c, double base_acceleration)
-{
-    const vi_structure parts = parts_of(c);
-    vi_structure_outputs(&parts, c->modal_acceleration);
-    c->displacement = vi_structure_observed(&parts);
-    c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
-    c->acceleration = vi_structure_at(&c->model, c->model.observed, c->modal_acceleration) + base_acceleration;
-    update_energies(c);
+    return true;
 }
 
 /* ---- steps ---- */
 
-static void check_passed(const vi_body *c, char *message)
-{
-    const int passed = c->state.passed;
-    if (passed) {
-        vi_complain(message, "contact[%d]: the last step passed through a stop whose law is external (event_time"
-                             " %.17g); restore the state before it and step to event_time", passed,
-                    c->contacts[passed - 1].event_time);
-    }
-}
-
-bool vi_body_step_is_good(const vi_body *c, const vi_step_request *request,
-                                         vi_instant *target, char message[VI_MESSAGE_LENGTH])
-{
-    if (!(request->size > 0.0) || !isfinite(request->size)) {
-        vi_complain(message, "communicationStepSize: expected a finite number > 0, got %.17g", request->size);
-    }
-    const double now = vi_body_time(c);
-    if (!(fabs(request->time - now) <= TIME_MISMATCH * (1.0 + fabs(now)))) {
-        vi_complain(message, "currentCommunicationPoint: expected %.17g (the end of the last step), got %.17g", now,
-                    request->time);
-    }
-    /* the end of the step with its rounding, so that steps of 1e-9 s at 1e6 s are no shorter or longer */
-    const double high = request->time + request->size;
-    const double part = high - request->time;
-    const double low = (request->time - (high - part)) + (request->size - part);
-    if (message[0] == '\0' && !vi_clock_instant(&c->model.clock, high, low, target)) {
-        vi_complain(message, "currentCommunicationPoint: expected a time below 2^53 periods, got %.17g", high);
-    }
-    check_inputs(c, message);
-    check_passed(c, message);
-    return message[0] == '\0';
-}
-
-/* A stop that answers with a force has answered once its importer goes on: the force follows by the inputs. */
-static void check_answer(const vi_body *c, int k, char *message)
-{
-    const vi_contact *contact = &c->contacts[k];
-    const double r = contact->applied_restitution;
-    if (vi_contact_law_is_rigid(contact->law.law) && !(contact->answered && r >= 0.0 && r <= 1.0)) {
-        vi_complain(message, "contact[%d].applied_restitution: expected an answer 0 <= r <= 1 to the contact at"
-                             " %.17g s, got %s%.17g", k + 1, contact->event_time,
-                    contact->answered ? "" : "none; last value ", r);
-    }
-}
-
-bool vi_body_resolve(vi_body *c, char message[VI_MESSAGE_LENGTH])
+/* Resolve what is pending; false when the answer is missing or bad. */
+static bool resolve_pending(vi_body *c, char *message)
 {
     if (!c->state.pending) {
         return true;
     }
-    for (int k = 0; k < c->model.contacts; ++k) {
-        if (c->state.asking[k]) { /* several at one instant wait for their answers together */
-            check_answer(c, k, message);
-        }
-    }
-    if (message[0] != '\0') {
+    if (!vi_body_check_answers(c, message)) {
         return false;
     }
-    const vi_structure parts = parts_of(c);
+    const vi_structure parts = vi_body_parts(c);
     vi_structure_resolve(&parts);
     return true;
 }
 
-vi_step_result vi_body_advance(vi_body *c, vi_instant target,
-                                              const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
+static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
-    const vi_structure parts = parts_of(c);
+    if (!resolve_pending(vi_body_of(self), message)) {
+        return false;
+    }
+    update_outputs(self);
+    return true;
+}
+
+/* Is the next step the rest of one that ended early for no reason of the motion, under the same inputs? Their slopes, and
+ * what is found at the start of a step, then hold on. */
+static bool continues(const vi_body *c)
+{
+    return c->state.budget.unfinished && !c->inputs_changed;
+}
+
+/* Complain of a tuned forcing that the body cannot go on with. */
+static void check_drive(const void *self, const vi_body *c, char *message)
+{
+    if (c->forcing_changed) {
+        form->check_forcing(self, message);
+        vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency, c->state.now);
+    }
+}
+
+static vi_step_result advance(vi_body *c, vi_instant target, const vi_step_request *request, char *message)
+{
+    const vi_structure parts = vi_body_parts(c);
     c->state.follow_energies = c->record_energies;
     const vi_step_result result = vi_structure_advance(&parts, target, request);
     if (result == VI_STEP_STANDSTILL) {
         vi_structure_complain(&parts, message);
     }
-    vi_complain_of_end(message, result, vi_body_time(c));
+    vi_complain_of_end(message, result, vi_clock_time(&c->model.clock, c->state.now));
     return result;
 }
 
-bool vi_body_needs_events(const vi_body *c)
+static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
+{
+    vi_body *c = vi_body_of(self);
+    vi_instant target;
+    drive(self, c);
+    form->check_inputs(self, message);
+    check_drive(self, c, message);
+    if (!vi_body_check_step(c, request, &target, message) || !resolve_pending(c, message)) {
+        return VI_STEP_ERROR;
+    }
+    if (!continues(c)) {
+        take_impulses(c);
+        if (form->follow_amplitudes != NULL) {
+            form->follow_amplitudes(self);
+        }
+        hold_inputs(self, c);
+    }
+    const vi_step_result result = advance(c, target, request, message);
+    update_outputs(self);
+    return result;
+}
+
+static bool event_pending(const void *self)
+{
+    return const_body_of(self)->state.pending != 0;
+}
+
+static bool needs_events(const void *self)
 {
     for (int k = 0; k < VI_PORTS; ++k) {
-        if (vi_contact_law_asks(c->contacts[k].law.law)) {
+        if (vi_contact_law_asks(const_body_of(self)->contacts[k].law.law)) {
             return true;
         }
     }
     return false;
 }
 
-size_t vi_body_unused(const vi_body *c)
+/* What follows from the rest is not saved, nor are unused rows of the record. */
+static size_t used_size(const void *self)
 {
-    return vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan;
+    const vi_body *c = const_body_of(self);
+    return vi_this_description.struct_size - (vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan);
 }
+
+const vi_component vi_this_component = {
+    .defaults = defaults,
+    .initialize = initialize,
+    .was_set = was_set,
+    .update_outputs = update_outputs,
+    .step = step,
+    .resolve = resolve,
+    .event_pending = event_pending,
+    .needs_events = needs_events,
+    .time = present_time,
+    .used_size = used_size,
+    .sized = sized,
+    .exchange = &vi_body_exchange,
+};

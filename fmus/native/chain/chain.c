@@ -5,10 +5,8 @@
 #include <string.h>
 
 #include "chain_variables.h"
-#include "component.h"
 
 enum { START_MASSES = 2 };
-enum { STRIDE = CHAIN_CONTACT_APPLIED_RESTITUTION_2 - CHAIN_CONTACT_APPLIED_RESTITUTION_1 };
 
 static void defaults(void *self)
 {
@@ -18,7 +16,6 @@ static void defaults(void *self)
     for (int i = 0; i < VI_MODES; ++i) {
         c->parameter.mass[i] = c->parameter.stiffness[i] = 1.0;
     }
-    vi_body_defaults(&c->body);
 }
 
 static void sized(void *self, const char *block, int count)
@@ -27,7 +24,6 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "masses") == 0 && count >= 1 && count <= VI_MODES) {
         c->masses = c->masses_described = count;
     }
-    vi_body_sized(&c->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -40,14 +36,16 @@ static void check_mass_number(char *message, const char *name, const chain *c, i
     }
 }
 
-static void check_inputs(const chain *c, char *message)
+static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
 {
+    const chain *c = self;
     vi_check_each(message, vi_check_finite, "force", c->force, (int)c->masses);
     vi_check_each(message, vi_check_finite, "force_rate", c->force_rate, (int)c->masses);
 }
 
-static void check_forcing(const chain *c, char *message)
+static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
 {
+    const chain *c = self;
     vi_check_each(message, vi_check_finite, "forcing.amplitude", c->forcing_amplitude, (int)c->masses);
     vi_check_finite(message, "forcing.base_acceleration", c->forcing_base_acceleration);
 }
@@ -131,8 +129,9 @@ static bool find_modes(chain *c, vi_chain_modes *modes, char *message)
 }
 
 /* Modal amplitudes of the harmonic force and of the base's inertial one; a force of frequency 0 is constant. */
-static void find_forces(const chain *c, double force[VI_MODES])
+static void find_forcing(const void *self, double force[VI_MODES])
 {
+    const chain *c = self;
     double load[VI_MODES];
     const bool constant = c->body.forcing_angular_frequency == 0.0;
     const double share = constant ? cos(c->body.forcing_phase) : 1.0;
@@ -149,7 +148,7 @@ static void fill_model(chain *c, const vi_chain_modes *modes)
 {
     vi_structure_model *model = &c->body.model;
     double force[VI_MODES];
-    find_forces(c, force);
+    find_forcing(c, force);
     model->modes = (int32_t)modes_of(c);
     model->contacts = vi_body_ports(&c->body);
     model->coupled = !modes->classical;
@@ -179,69 +178,7 @@ static void start_modes(chain *c)
     project(c, velocity, c->body.state.p);
 }
 
-/* As an importer integrates it: its states are those of the masses. */
-static vi_exchange_body exchange_body(chain *c)
-{
-    vi_exchange_body body = vi_body_exchange(&c->body);
-    body.modes = (int)c->masses_described;
-    body.shape = (const double(*)[VI_MODES])c->shape;
-    body.mass = c->parameter.mass;
-    body.refused = modes_of(c) < c->masses ? "modes" : body.refused;
-    return body;
-}
-
-/* ---- life ---- */
-
-static void hold_inputs(chain *c)
-{
-    double load[VI_MODES], rate[VI_MODES], held[VI_MODES], held_rate[VI_MODES];
-    for (int i = 0; i < c->masses; ++i) {
-        load[i] = c->force[i] - c->parameter.mass[i] * c->body.base_acceleration;
-        rate[i] = c->force_rate[i] - c->parameter.mass[i] * c->body.base_acceleration_rate;
-    }
-    project(c, load, held);
-    project(c, rate, held_rate);
-    vi_body_hold(&c->body, held, held_rate);
-}
-
-static void drive(chain *c)
-{
-    double force[VI_MODES];
-    if (c->body.forcing_changed) {
-        find_forces(c, force);
-        vi_body_drive(&c->body, force);
-    }
-}
-
-static void refresh_inputs(chain *c)
-{
-    drive(c);
-    if (c->body.inputs_changed) {
-        vi_body_take_impulses(&c->body);
-        hold_inputs(c);
-    }
-}
-
-static void update_outputs(void *self)
-{
-    chain *c = self;
-    refresh_inputs(c);
-    c->time = vi_body_time(&c->body);
-    const double base = vi_body_base_acceleration(&c->body, c->forcing_base_acceleration);
-    vi_body_outputs(&c->body, base);
-    for (int i = 0; i < c->masses; ++i) {
-        c->displacement[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.q);
-        c->velocity[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.p);
-        c->relative_acceleration[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.modal_acceleration);
-        c->acceleration[i] = c->relative_acceleration[i] + base;
-    }
-    if (c->body.state.exchange.on) {
-        const vi_exchange_body body = exchange_body(c);
-        vi_exchange_show_indicators(&body);
-    }
-}
-
-static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
 {
     chain *c = self;
     vi_chain_modes modes;
@@ -250,98 +187,63 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     }
     fill_model(c, &modes);
     start_modes(c);
-    if (!vi_body_start(&c->body, start_time, "displacement_start", message)) {
-        return false;
-    }
-    hold_inputs(c);
-    update_outputs(c);
     return true;
 }
 
-static void was_set(void *self, uint32_t reference)
+/* ---- life ---- */
+
+static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
+{
+    const chain *c = self;
+    double load[VI_MODES], rate[VI_MODES];
+    for (int i = 0; i < c->masses; ++i) {
+        load[i] = c->force[i] - c->parameter.mass[i] * c->body.base_acceleration;
+        rate[i] = c->force_rate[i] - c->parameter.mass[i] * c->body.base_acceleration_rate;
+    }
+    project(c, load, held);
+    project(c, rate, held_rate);
+}
+
+static double base_forcing(const void *self)
+{
+    return ((const chain *)self)->forcing_base_acceleration;
+}
+
+static void update_outputs(void *self, double base_acceleration)
 {
     chain *c = self;
-    const size_t offset = vi_this_component.variables[reference].offset, first = offsetof(chain, forcing_amplitude);
-    if ((offset >= first && offset < first + sizeof c->forcing_amplitude)
-        || reference == CHAIN_FORCING_BASE_ACCELERATION || reference == CHAIN_FORCING_ANGULAR_FREQUENCY) {
-        c->body.forcing_changed = 1;
+    for (int i = 0; i < c->masses; ++i) {
+        c->displacement[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.q);
+        c->velocity[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.p);
+        c->relative_acceleration[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.modal_acceleration);
+        c->acceleration[i] = c->relative_acceleration[i] + base_acceleration;
     }
-    vi_body_was_set(&c->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
-                                   CHAIN_RECORD_TAKEN);
 }
 
-static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
+/* Its states are those of the masses. */
+static void show_states(void *self, vi_exchange_body *body)
 {
     chain *c = self;
-    if (!vi_body_resolve(&c->body, message)) {
-        return false;
-    }
-    update_outputs(c);
-    return true;
+    body->modes = (int)c->masses_described;
+    body->shape = (const double(*)[VI_MODES])c->shape;
+    body->mass = c->parameter.mass;
+    body->refused = modes_of(c) < c->masses ? "modes" : NULL;
 }
 
-/* Of a tuned forcing that the body has not gone on with. */
-static void check_drive(const chain *c, char *message)
-{
-    if (c->body.forcing_changed) {
-        check_forcing(c, message);
-        vi_body_check_drive(&c->body, message);
-    }
-}
-
-static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
-{
-    chain *c = self;
-    vi_instant target;
-    drive(c);
-    check_inputs(c, message);
-    check_drive(c, message);
-    if (!vi_body_step_is_good(&c->body, request, &target, message)
-        || !vi_body_resolve(&c->body, message)) {
-        return VI_STEP_ERROR;
-    }
-    if (!vi_body_continues(&c->body)) {
-        vi_body_take_impulses(&c->body);
-        hold_inputs(c);
-    }
-    const vi_step_result result = vi_body_advance(&c->body, target, request, message);
-    update_outputs(c);
-    return result;
-}
-
-static bool event_pending(const void *self)
-{
-    return ((const chain *)self)->body.state.pending != 0;
-}
-
-static bool needs_events(const void *self)
-{
-    return vi_body_needs_events(&((const chain *)self)->body);
-}
-
-static double present_time(const void *self)
-{
-    return vi_body_time(&((const chain *)self)->body);
-}
-
-static size_t used_size(const void *self)
-{
-    return sizeof(chain) - vi_body_unused(&((const chain *)self)->body);
-}
-
-VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
-
-const vi_component vi_this_component = {
+const vi_body_form vi_this_body = {
+    .place = offsetof(chain, body),
+    .restitution = CHAIN_CONTACT_APPLIED_RESTITUTION_1,
+    .stride = CHAIN_CONTACT_APPLIED_RESTITUTION_2 - CHAIN_CONTACT_APPLIED_RESTITUTION_1,
+    .taken = CHAIN_RECORD_TAKEN,
+    .start = "displacement_start",
     .defaults = defaults,
-    .initialize = initialize,
-    .was_set = was_set,
-    .update_outputs = update_outputs,
-    .step = step,
-    .resolve = resolve,
-    .event_pending = event_pending,
-    .needs_events = needs_events,
-    .time = present_time,
-    .used_size = used_size,
     .sized = sized,
-    .exchange = &exchange,
+    .prepare = prepare,
+    .check_inputs = check_inputs,
+    .check_forcing = check_forcing,
+    .find_forcing = find_forcing,
+    .find_inputs = find_inputs,
+    .base_forcing = base_forcing,
+    .update_outputs = update_outputs,
+    .show_states = show_states,
 };

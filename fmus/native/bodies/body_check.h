@@ -1,0 +1,19 @@
+/* What is wrong with a body's parameters, inputs and steps; each complains in `message`. */
+#ifndef VIBROIMPACT_BODY_CHECK_H
+#define VIBROIMPACT_BODY_CHECK_H
+
+#include "body.h"
+
+void vi_body_check_inputs(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
+
+/* Stops at one point of the body leave room, and no rigid one hides the one behind it; the model is prepared. */
+void vi_body_check_points(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
+
+/* Is the step one that can be made? *target: its end. */
+bool vi_body_check_step(const vi_body *c, const vi_step_request *request, vi_instant *target,
+                        char message[VI_MESSAGE_LENGTH]);
+
+/* Has each contact that asks for an answer a good one? */
+bool vi_body_check_answers(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
+
+#endif
