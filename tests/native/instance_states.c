@@ -79,16 +79,6 @@ static void count_lines(const vi_instance *instance, int level, const char *cate
     lines += 1;
 }
 
-static void move_doubles(void *field, void *values, size_t first, size_t count)
-{
-    memcpy((double *)values + first, field, count * sizeof(double));
-}
-
-static void take_doubles(void *field, void *values, size_t first, size_t count)
-{
-    memcpy(field, (const double *)values + first, count * sizeof(double));
-}
-
 static vi_instance *started(void)
 {
     vi_instance *instance = vi_instance_new("thing");
@@ -114,9 +104,9 @@ static void random_references_and_sizes_are_errors_or_right(uint64_t *seed)
         const int before = lines;
         bool good;
         if (type == VI_FLOAT64 && choice(seed, 2) == 0) {
-            good = vi_instance_set(instance, "set", type, references, count, values, room, take_doubles);
+            good = vi_instance_set(instance, "set", type, references, count, values, room, vi_write_doubles);
         } else if (type == VI_FLOAT64) {
-            good = vi_instance_get(instance, "get", type, references, count, values, room, move_doubles);
+            good = vi_instance_get(instance, "get", type, references, count, values, room, vi_read_doubles);
         } else {
             continue;
         }
@@ -129,7 +119,7 @@ static void states_come_back_and_damaged_ones_do_not(uint64_t *seed)
 {
     vi_instance *instance = started();
     thing *t = instance->self;
-    vi_saved *saved = NULL;
+    void *saved = NULL;
     for (int n = 0; n < 20000; ++n) {
         t->used = choice(seed, 4) == 0 ? 1000 : choice(seed, 30);
         t->time = uniform(seed, -1.0, 1.0);
@@ -137,35 +127,37 @@ static void states_come_back_and_damaged_ones_do_not(uint64_t *seed)
             t->rows[row] = t->time + (double)row;
         }
         if (choice(seed, 3) == 0) { /* else the slot is used again */
-            vi_saved_free(saved);
-            saved = NULL;
+            vi_state_free(&saved);
         }
-        CHECK(vi_instance_save(instance, "save", &saved), "%s", "save");
-        const size_t size = vi_saved_size(saved);
+        CHECK(vi_state_save(instance, "save", &saved), "%s", "save");
+        size_t size = 0;
+        CHECK(vi_state_size(instance, saved, &size), "%s", "size");
         unsigned char *bytes = malloc(size); /* of this very size: the sanitizer sees a byte too many */
         CHECK(bytes != NULL, "%s", "memory");
-        vi_saved_write(saved, bytes);
+        CHECK(!vi_state_write(instance, saved, bytes, size - 1), "%s", "no room");
+        CHECK(vi_state_write(instance, saved, bytes, size), "%s", "write");
         const double time = t->time;
         const int64_t used = t->used;
         t->time = 7.0;
         t->used = 0;
-        vi_saved *back = vi_saved_read(instance, "read", bytes, size);
-        CHECK(back != NULL && vi_instance_restore(instance, "restore", back), "%s", "restore");
+        void *back = NULL;
+        CHECK(vi_state_read(instance, "read", bytes, size, &back), "%s", "read");
+        CHECK(vi_state_restore(instance, "restore", back), "%s", "restore");
         CHECK(t->time == time && t->used == used, "%g, %lld", t->time, (long long)t->used);
         CHECK(used == 0 || t->rows[used - 1] == time + (double)(used - 1), "%s", "rows");
-        vi_saved_free(back);
+        vi_state_free(&back);
         const size_t place = (size_t)(next_random(seed) % size);
         bytes[place] = (unsigned char)(bytes[place] ^ (1u << choice(seed, 8)));
-        CHECK(vi_saved_read(instance, "read", bytes, size) == NULL, "byte %lu changed", (unsigned long)place);
-        CHECK(vi_saved_read(instance, "read", bytes, (size_t)(next_random(seed) % size)) == NULL, "%s", "cut");
+        CHECK(!vi_state_read(instance, "read", bytes, size, &back), "byte %lu changed", (unsigned long)place);
+        CHECK(!vi_state_read(instance, "read", bytes, (size_t)(next_random(seed) % size), &back), "%s", "cut");
         for (size_t i = 0; i < size; ++i) {
             bytes[i] = (unsigned char)next_random(seed);
         }
-        CHECK(vi_saved_read(instance, "read", bytes, size) == NULL, "%s", "noise");
+        CHECK(!vi_state_read(instance, "read", bytes, size, &back), "%s", "noise");
         free(bytes);
     }
-    CHECK(!vi_instance_restore(instance, "restore", NULL), "%s", "no state");
-    vi_saved_free(saved);
+    CHECK(!vi_state_restore(instance, "restore", NULL), "%s", "no state");
+    vi_state_free(&saved);
     vi_instance_free(instance);
 }
 
@@ -235,12 +227,12 @@ static void described_references_are_places_in_the_list(const char *folder)
     instance->mode = VI_MODE_INSTANTIATED;
     const double value = 7.5;
     const uint32_t parameter = 5;
-    CHECK(vi_instance_set(instance, "set", VI_FLOAT64, &parameter, 1, &value, 1, take_doubles), "%s", "the fifth");
+    CHECK(vi_instance_set(instance, "set", VI_FLOAT64, &parameter, 1, &value, 1, vi_write_doubles), "%s", "the fifth");
     CHECK(((thing *)instance->self)->parameter == value, "%g", ((thing *)instance->self)->parameter);
     const uint32_t none[] = {0, 3, 4, 6, UINT32_MAX};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
         double got = 0.0;
-        CHECK(!vi_instance_get(instance, "get", VI_FLOAT64, &none[i], 1, &got, 1, move_doubles), "%lu",
+        CHECK(!vi_instance_get(instance, "get", VI_FLOAT64, &none[i], 1, &got, 1, vi_read_doubles), "%lu",
               (unsigned long)none[i]);
     }
     vi_instance_free(instance);
@@ -262,7 +254,7 @@ static void any_references_do_no_harm(uint64_t *seed, const char *folder)
         CHECK(described == (instance->reference_count > 0) && instance->reference_count <= VARIABLES, "%s", text);
         for (uint32_t reference = 0; described && reference < 2 * VARIABLES; ++reference) {
             double got[8] = {0};
-            (void)vi_instance_get(instance, "get", VI_FLOAT64, &reference, 1, got, 8, move_doubles);
+            (void)vi_instance_get(instance, "get", VI_FLOAT64, &reference, 1, got, 8, vi_read_doubles);
         }
         vi_instance_free(instance);
     }

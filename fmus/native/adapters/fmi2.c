@@ -14,7 +14,9 @@
 #include "model_exchange.h"
 #include "saved_states.h"
 
-#define UNUSED(argument) (void)(argument)
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* FMI says which parameters there are */
+#endif
 
 static fmi2Status status(bool good)
 {
@@ -52,8 +54,6 @@ const char *fmi2GetVersion(void)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[])
 {
-    UNUSED(nCategories);
-    UNUSED(categories);
     if (c == NULL) {
         return fmi2Error;
     }
@@ -74,7 +74,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn)
 {
-    UNUSED(visible);
     if (instanceName == NULL || instanceName[0] == '\0') {
         return refuse(functions, instanceName, "fmi2Instantiate: expected an instance name, got none");
     }
@@ -112,23 +111,18 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    UNUSED(toleranceDefined);
-    UNUSED(tolerance);
     vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)) {
-        return fmi2Error;
-    }
     const double stop = stopTimeDefined ? stopTime : HUGE_VAL;
-    return vi_instance_set_experiment(it, "fmi2SetupExperiment", startTime, stop) ? fmi2OK : fmi2Error;
+    return status(vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)
+                  && vi_instance_set_experiment(it, "fmi2SetupExperiment", startTime, stop));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
     vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect(it, "fmi2EnterInitializationMode", VI_MODE_INSTANTIATED)) {
+    if (!vi_instance_enter(it, "fmi2EnterInitializationMode", VI_MODE_INSTANTIATED, VI_MODE_INITIALIZATION)) {
         return fmi2Error;
     }
-    it->mode = VI_MODE_INITIALIZATION;
     it->outputs_stale = true;
     return fmi2OK;
 }
@@ -137,8 +131,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     static const char function[] = "fmi2ExitInitializationMode";
     vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_INITIALIZATION)
-        || !vi_instance_initialize(it, function)) {
+    if (!vi_instance_expect(it, function, VI_MODE_INITIALIZATION) || !vi_instance_initialize(it, function)) {
         return fmi2Error;
     }
     it->mode = it->exchange ? VI_MODE_EVENT : VI_MODE_STEP;
@@ -147,12 +140,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 
 fmi2Status fmi2Terminate(fmi2Component c)
 {
-    vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect(it, "fmi2Terminate", VI_RUNNING)) {
-        return fmi2Error;
-    }
-    it->mode = VI_MODE_TERMINATED;
-    return fmi2OK;
+    return status(vi_instance_enter(c, "fmi2Terminate", VI_RUNNING, VI_MODE_TERMINATED));
 }
 
 fmi2Status fmi2Reset(fmi2Component c)
@@ -170,9 +158,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     static const char function[] = "fmi2DoStep";
-    UNUSED(noSetFMUStatePriorToCurrentPoint);
     vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect_steps(it, function) || !vi_instance_expect(it, function, VI_MODE_STEP)
+    if (!vi_instance_expect_steps(it, function) || !vi_instance_expect(it, function, VI_MODE_STEP)
         || !vi_instance_expect_end(it, function, currentCommunicationPoint, communicationStepSize)) {
         return fmi2Error;
     }
@@ -220,8 +207,6 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
 {
-    UNUSED(s);
-    UNUSED(value);
     return unavailable(c, "fmi2GetIntegerStatus");
 }
 
@@ -236,22 +221,10 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
 {
-    UNUSED(s);
-    UNUSED(value);
     return unavailable(c, "fmi2GetStringStatus");
 }
 
 /* ---- variables ---- */
-
-static void read_real(void *field, void *values, size_t first, size_t count)
-{
-    memcpy((double *)values + first, field, count * sizeof(double));
-}
-
-static void write_real(void *field, void *values, size_t first, size_t count)
-{
-    memcpy(field, (const double *)values + first, count * sizeof(double));
-}
 
 /* FMI 2.0 integers have 32 bits: larger counts are shown as the largest. */
 static void read_integer(void *field, void *values, size_t first, size_t count)
@@ -296,8 +269,8 @@ static void write_boolean(void *field, void *values, size_t first, size_t count)
                       && vi_instance_set(c, "fmi2Set" #NAME, TYPE, vr, nvr, value, nvr, CONVERT))));                 \
     }
 
-GETTER(Real, VI_FLOAT64, read_real)
-SETTER(Real, VI_FLOAT64, write_real)
+GETTER(Real, VI_FLOAT64, vi_read_doubles)
+SETTER(Real, VI_FLOAT64, vi_write_doubles)
 GETTER(Integer, VI_INT64, read_integer)
 SETTER(Integer, VI_INT64, write_integer)
 GETTER(Boolean, VI_BOOLEAN, read_boolean)
@@ -305,33 +278,23 @@ SETTER(Boolean, VI_BOOLEAN, write_boolean)
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
 {
-    UNUSED(vr);
-    UNUSED(value);
     return nvr == 0 ? fmi2OK : unavailable(c, "fmi2GetString");
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
-    UNUSED(vr);
-    UNUSED(value);
     return nvr == 0 ? fmi2OK : unavailable(c, "fmi2SetString");
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[])
 {
-    UNUSED(vr);
-    UNUSED(order);
-    UNUSED(value);
     return nvr == 0 ? fmi2OK : unavailable(c, "fmi2SetRealInputDerivatives");
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[])
 {
-    UNUSED(vr);
-    UNUSED(order);
-    UNUSED(value);
     return nvr == 0 ? fmi2OK : unavailable(c, "fmi2GetRealOutputDerivatives");
 }
 
@@ -339,71 +302,37 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown,
                                         const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
-    UNUSED(vUnknown_ref);
-    UNUSED(nUnknown);
-    UNUSED(vKnown_ref);
-    UNUSED(nKnown);
-    UNUSED(dvKnown);
-    UNUSED(dvUnknown);
     return unavailable(c, "fmi2GetDirectionalDerivative");
 }
 
 /* ---- saved states ---- */
 
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    vi_saved *saved = FMUstate != NULL ? *FMUstate : NULL;
-    if (c == NULL || FMUstate == NULL || !vi_instance_save(c, "fmi2GetFMUstate", &saved)) {
-        return fmi2Error;
-    }
-    *FMUstate = saved;
-    return fmi2OK;
+    return status(vi_state_save(c, "fmi2GetFMUstate", state));
 }
 
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    return status(c != NULL && vi_instance_restore(c, "fmi2SetFMUstate", FMUstate));
+    return status(vi_state_restore(c, "fmi2SetFMUstate", state));
 }
 
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    UNUSED(c);
-    if (FMUstate != NULL) {
-        vi_saved_free(*FMUstate);
-        *FMUstate = NULL;
-    }
-    return fmi2OK;
+    return status(vi_state_free(state));
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
-    if (c == NULL || FMUstate == NULL || size == NULL) {
-        return fmi2Error;
-    }
-    *size = vi_saved_size(FMUstate);
-    return fmi2OK;
+    return status(vi_state_size(c, state, size));
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    if (c == NULL || FMUstate == NULL || serializedState == NULL || size < vi_saved_size(FMUstate)) {
-        return fmi2Error;
-    }
-    vi_saved_write(FMUstate, (unsigned char *)serializedState);
-    return fmi2OK;
+    return status(vi_state_write(c, state, (unsigned char *)bytes, size));
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
-                                   fmi2FMUstate *FMUstate)
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
-    if (c == NULL || serializedState == NULL || FMUstate == NULL) {
-        return fmi2Error;
-    }
-    vi_saved *saved =
-        vi_saved_read(c, "fmi2DeSerializeFMUstate", (const unsigned char *)serializedState, size);
-    if (saved == NULL) {
-        return fmi2Error;
-    }
-    *FMUstate = saved;
-    return fmi2OK;
+    return status(vi_state_read(c, "fmi2DeSerializeFMUstate", (const unsigned char *)bytes, size, state));
 }

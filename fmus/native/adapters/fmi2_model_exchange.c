@@ -3,7 +3,9 @@
 
 #include "model_exchange.h"
 
-#define UNUSED(argument) (void)(argument)
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* FMI says which parameters there are */
+#endif
 
 static fmi2Status status(bool good)
 {
@@ -12,12 +14,8 @@ static fmi2Status status(bool good)
 
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
-    vi_instance *it = c;
-    if (!vi_instance_expect_exchange(it, "fmi2EnterEventMode", VI_MODE_CONTINUOUS)) {
-        return fmi2Error;
-    }
-    it->mode = VI_MODE_EVENT;
-    return fmi2OK;
+    return status(vi_instance_expect_exchange(c, "fmi2EnterEventMode", VI_ANY_MODE)
+                  && vi_instance_enter(c, "fmi2EnterEventMode", VI_MODE_CONTINUOUS, VI_MODE_EVENT));
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
@@ -42,7 +40,6 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
 {
-    UNUSED(noSetFMUStatePriorToCurrentPoint);
     if (enterEventMode == NULL || terminateSimulation == NULL
         || !vi_instance_expect_exchange(c, "fmi2CompletedIntegratorStep", VI_MODE_CONTINUOUS)) {
         return fmi2Error;

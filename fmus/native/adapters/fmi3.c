@@ -9,7 +9,9 @@
 #include "model_exchange.h"
 #include "saved_states.h"
 
-#define UNUSED(argument) (void)(argument)
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* FMI says which parameters there are */
+#endif
 
 static fmi3Status status(bool good)
 {
@@ -34,8 +36,6 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
-    UNUSED(nCategories);
-    UNUSED(categories);
     if (instance == NULL) {
         return fmi3Error;
     }
@@ -92,11 +92,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
     static const char function[] = "fmi3InstantiateCoSimulation";
-    UNUSED(visible);
     /* FMI lets an importer require only variables that are described as intermediate, which none of ours is; some
      * require all they record. The callback is never called, and all values are there at the end of a step. */
-    UNUSED(requiredIntermediateVariables);
-    UNUSED(intermediateUpdate);
     vi_instance *instance = instantiate(function, instanceName, instantiationToken, resourcePath, loggingOn,
                                         instanceEnvironment, logMessage);
     if (instance != NULL) {
@@ -116,7 +113,6 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3LogMessageCallback logMessage)
 {
     static const char function[] = "fmi3InstantiateModelExchange";
-    UNUSED(visible);
     if (vi_this_component.exchange == NULL) {
         refuse(logMessage, instanceEnvironment, function, "only co-simulation is available");
         return NULL;
@@ -137,14 +133,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                                                fmi3LockPreemptionCallback lockPreemption,
                                                fmi3UnlockPreemptionCallback unlockPreemption)
 {
-    UNUSED(instanceName);
-    UNUSED(instantiationToken);
-    UNUSED(resourcePath);
-    UNUSED(visible);
-    UNUSED(loggingOn);
-    UNUSED(clockUpdate);
-    UNUSED(lockPreemption);
-    UNUSED(unlockPreemption);
     refuse(logMessage, instanceEnvironment, "fmi3InstantiateScheduledExecution", "not available in this component");
     return NULL;
 }
@@ -157,11 +145,9 @@ void fmi3FreeInstance(fmi3Instance instance)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    UNUSED(toleranceDefined);
-    UNUSED(tolerance);
     static const char function[] = "fmi3EnterInitializationMode";
     vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_INSTANTIATED)
+    if (!vi_instance_expect(it, function, VI_MODE_INSTANTIATED)
         || !vi_instance_set_experiment(it, function, startTime, stopTimeDefined ? stopTime : HUGE_VAL)) {
         return fmi3Error;
     }
@@ -188,7 +174,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
     static const char function[] = "fmi3ExitInitializationMode";
     vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_INITIALIZATION) || !events_are_handled(it, function)
+    if (!vi_instance_expect(it, function, VI_MODE_INITIALIZATION) || !events_are_handled(it, function)
         || !vi_instance_initialize(it, function)) {
         return fmi3Error;
     }
@@ -199,7 +185,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, "fmi3EnterEventMode", VI_MODE_STEP | VI_MODE_CONTINUOUS)) {
+    if (!vi_instance_expect(it, "fmi3EnterEventMode", VI_MODE_STEP | VI_MODE_CONTINUOUS)) {
         return fmi3Error;
     }
     if (!it->event_mode_used && !it->exchange) {
@@ -211,23 +197,13 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
-    vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect_steps(it, "fmi3EnterStepMode")
-        || !vi_instance_expect(it, "fmi3EnterStepMode", VI_MODE_EVENT)) {
-        return fmi3Error;
-    }
-    it->mode = VI_MODE_STEP;
-    return fmi3OK;
+    return status(vi_instance_expect_steps(instance, "fmi3EnterStepMode")
+                  && vi_instance_enter(instance, "fmi3EnterStepMode", VI_MODE_EVENT, VI_MODE_STEP));
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance)
 {
-    vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, "fmi3Terminate", VI_RUNNING)) {
-        return fmi3Error;
-    }
-    it->mode = VI_MODE_TERMINATED;
-    return fmi3OK;
+    return status(vi_instance_enter(instance, "fmi3Terminate", VI_RUNNING, VI_MODE_TERMINATED));
 }
 
 fmi3Status fmi3Reset(fmi3Instance instance)
@@ -246,7 +222,6 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn,
                       fmi3Float64 *lastSuccessfulTime)
 {
-    UNUSED(noSetFMUStatePriorToCurrentPoint);
     vi_instance *it = instance;
     if (it == NULL || eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL
         || lastSuccessfulTime == NULL || !vi_instance_expect_steps(it, "fmi3DoStep") || !vi_instance_expect(it, "fmi3DoStep", VI_MODE_STEP)
@@ -310,21 +285,10 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
-    vi_instance *it = instance;
-    return status(it != NULL && vi_instance_expect(it, "fmi3EvaluateDiscreteStates", VI_MODE_EVENT));
+    return status(vi_instance_expect(instance, "fmi3EvaluateDiscreteStates", VI_MODE_EVENT));
 }
 
 /* ---- variables ---- */
-
-static void read_float64(void *field, void *values, size_t first, size_t count)
-{
-    memcpy((double *)values + first, field, count * sizeof(double));
-}
-
-static void write_float64(void *field, void *values, size_t first, size_t count)
-{
-    memcpy(field, (const double *)values + first, count * sizeof(double));
-}
 
 static void read_int64(void *field, void *values, size_t first, size_t count)
 {
@@ -367,8 +331,8 @@ static void write_boolean(void *field, void *values, size_t first, size_t count)
                                          nValues, CONVERT));                                                         \
     }
 
-GETTER(Float64, fmi3Float64, VI_FLOAT64, read_float64)
-SETTER(Float64, fmi3Float64, VI_FLOAT64, write_float64)
+GETTER(Float64, fmi3Float64, VI_FLOAT64, vi_read_doubles)
+SETTER(Float64, fmi3Float64, VI_FLOAT64, vi_write_doubles)
 GETTER(Int64, fmi3Int64, VI_INT64, read_int64)
 SETTER(Int64, fmi3Int64, VI_INT64, write_int64)
 GETTER(Boolean, fmi3Boolean, VI_BOOLEAN, read_boolean)
@@ -376,60 +340,32 @@ SETTER(Boolean, fmi3Boolean, VI_BOOLEAN, write_boolean)
 
 /* ---- saved states ---- */
 
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
 {
-    vi_saved *saved = FMUState != NULL ? *FMUState : NULL;
-    if (instance == NULL || FMUState == NULL || !vi_instance_save(instance, "fmi3GetFMUState", &saved)) {
-        return fmi3Error;
-    }
-    *FMUState = saved;
-    return fmi3OK;
+    return status(vi_state_save(instance, "fmi3GetFMUState", state));
 }
 
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
 {
-    return status(instance != NULL && vi_instance_restore(instance, "fmi3SetFMUState", FMUState));
+    return status(vi_state_restore(instance, "fmi3SetFMUState", state));
 }
 
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state)
 {
-    UNUSED(instance);
-    if (FMUState != NULL) {
-        vi_saved_free(*FMUState);
-        *FMUState = NULL;
-    }
-    return fmi3OK;
+    return status(vi_state_free(state));
 }
 
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState state, size_t *size)
 {
-    if (instance == NULL || FMUState == NULL || size == NULL) {
-        return fmi3Error;
-    }
-    *size = vi_saved_size(FMUState);
-    return fmi3OK;
+    return status(vi_state_size(instance, state, size));
 }
 
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[],
-                                 size_t size)
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[], size_t size)
 {
-    if (instance == NULL || FMUState == NULL || serializedState == NULL || size < vi_saved_size(FMUState)) {
-        return fmi3Error;
-    }
-    vi_saved_write(FMUState, serializedState);
-    return fmi3OK;
+    return status(vi_state_write(instance, state, bytes, size));
 }
 
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
-                                   fmi3FMUState *FMUState)
+fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
 {
-    if (instance == NULL || serializedState == NULL || FMUState == NULL) {
-        return fmi3Error;
-    }
-    vi_saved *saved = vi_saved_read(instance, "fmi3DeserializeFMUState", serializedState, size);
-    if (saved == NULL) {
-        return fmi3Error;
-    }
-    *FMUState = saved;
-    return fmi3OK;
+    return status(vi_state_read(instance, "fmi3DeserializeFMUState", bytes, size, state));
 }

@@ -3,7 +3,9 @@
 
 #include "model_exchange.h"
 
-#define UNUSED(argument) (void)(argument)
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* FMI says which parameters there are */
+#endif
 
 static fmi3Status status(bool good)
 {
@@ -18,7 +20,6 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
 {
-    UNUSED(noSetFMUStatePriorToCurrentPoint);
     if (enterEventMode == NULL || terminateSimulation == NULL
         || !vi_instance_expect_exchange(instance, "fmi3CompletedIntegratorStep", VI_MODE_CONTINUOUS)) {
         return fmi3Error;

@@ -3,7 +3,9 @@
 
 #include "instance.h"
 
-#define UNUSED(argument) (void)(argument)
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* FMI says which parameters there are */
+#endif
 
 static fmi3Status unavailable(fmi3Instance instance, const char *function)
 {
@@ -19,17 +21,11 @@ static fmi3Status unavailable(fmi3Instance instance, const char *function)
     fmi3Status fmi3Get##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
                              size_t nValueReferences, CTYPE values[], size_t nValues)                                \
     {                                                                                                                \
-        UNUSED(valueReferences);                                                                                     \
-        UNUSED(values);                                                                                              \
-        UNUSED(nValues);                                                                                             \
         return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3Get" #NAME);                              \
     }                                                                                                                \
     fmi3Status fmi3Set##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
                              size_t nValueReferences, const CTYPE values[], size_t nValues)                          \
     {                                                                                                                \
-        UNUSED(valueReferences);                                                                                     \
-        UNUSED(values);                                                                                              \
-        UNUSED(nValues);                                                                                             \
         return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3Set" #NAME);                              \
     }
 
@@ -46,36 +42,24 @@ EMPTY_TYPE(String, fmi3String)
 fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                          size_t valueSizes[], fmi3Binary values[], size_t nValues)
 {
-    UNUSED(valueReferences);
-    UNUSED(valueSizes);
-    UNUSED(values);
-    UNUSED(nValues);
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetBinary");
 }
 
 fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                          const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
 {
-    UNUSED(valueReferences);
-    UNUSED(valueSizes);
-    UNUSED(values);
-    UNUSED(nValues);
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetBinary");
 }
 
 fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                         fmi3Clock values[])
 {
-    UNUSED(valueReferences);
-    UNUSED(values);
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetClock");
 }
 
 fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                         const fmi3Clock values[])
 {
-    UNUSED(valueReferences);
-    UNUSED(values);
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetClock");
 }
 
@@ -86,11 +70,6 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     {                                        \
         return unavailable(instance, #NAME); \
     }
-
-#if defined(__GNUC__) || defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-#endif
 
 UNAVAILABLE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference valueReference,
             size_t *nDependencies)
@@ -126,7 +105,3 @@ UNAVAILABLE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueRefe
             size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
 UNAVAILABLE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clockReference,
             fmi3Float64 activationTime)
-
-#if defined(__GNUC__) || defined(__clang__)
-#pragma GCC diagnostic pop
-#endif

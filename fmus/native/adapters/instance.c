@@ -201,6 +201,15 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes)
     return vi_instance_fail(instance, function, "not allowed now: the instance is %s", mode_name(instance->mode));
 }
 
+bool vi_instance_enter(vi_instance *instance, const char *function, int from, vi_mode_of_use to)
+{
+    if (!vi_instance_expect(instance, function, from)) {
+        return false;
+    }
+    instance->mode = to;
+    return true;
+}
+
 bool vi_instance_expect_steps(vi_instance *instance, const char *function)
 {
     return instance == NULL || !instance->exchange
@@ -382,4 +391,14 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
     }
     instance->outputs_stale = true;
     return all_values_used(instance, function, first, value_count);
+}
+
+void vi_read_doubles(void *field, void *values, size_t first, size_t count)
+{
+    memcpy((double *)values + first, field, count * sizeof(double));
+}
+
+void vi_write_doubles(void *field, void *values, size_t first, size_t count)
+{
+    memcpy(field, (const double *)values + first, count * sizeof(double));
 }

@@ -77,6 +77,9 @@ bool vi_instance_expect_end(vi_instance *instance, const char *function, double 
 /* Is there an instance, and in one of these modes? If not, log it. */
 bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 
+/* From one of these modes into another. */
+bool vi_instance_enter(vi_instance *instance, const char *function, int from, vi_mode_of_use to);
+
 /* Initialization's end: false (with the component's message logged) when a parameter is bad. Logs its warning. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
 
@@ -99,5 +102,9 @@ bool vi_instance_get(vi_instance *instance, const char *function, int type, cons
                      void *values, size_t value_count, vi_convert convert);
 bool vi_instance_set(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      const void *values, size_t value_count, vi_convert convert);
+
+/* Conversions of doubles. */
+void vi_read_doubles(void *field, void *values, size_t first, size_t count);
+void vi_write_doubles(void *field, void *values, size_t first, size_t count);
 
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* A saved state: this header, then the used part of the component's struct. */
-struct vi_saved {
+typedef struct {
     char magic[8];
     uint64_t token_hash, state_hash;
     uint64_t size, capacity; /* of the data, bytes */
@@ -12,7 +12,7 @@ struct vi_saved {
     double start_time;
     int64_t outputs_stale;
     unsigned char data[];
-};
+} vi_saved;
 
 static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '1'};
 
@@ -47,31 +47,38 @@ static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
     return hash(h, data, header->size);
 }
 
-bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved)
+bool vi_state_save(vi_instance *instance, const char *function, void **state)
 {
+    if (instance == NULL || state == NULL) {
+        return false;
+    }
     const size_t size = used_size(instance);
-    vi_saved *state = *saved;
-    if (state == NULL || state->capacity < size) {
-        state = realloc(state, sizeof(vi_saved) + size);
-        if (state == NULL) {
+    vi_saved *saved = *state;
+    if (saved == NULL || saved->capacity < size) {
+        saved = realloc(saved, sizeof(vi_saved) + size);
+        if (saved == NULL) {
             return vi_instance_fail(instance, function, "out of memory");
         }
-        memset(state, 0, sizeof(vi_saved));
-        state->capacity = size;
+        memset(saved, 0, sizeof(vi_saved));
+        saved->capacity = size;
     }
-    memcpy(state->magic, MAGIC, sizeof MAGIC);
-    state->size = size;
-    state->mode = (int64_t)instance->mode;
-    state->exchange = instance->exchange;
-    state->start_time = instance->start_time;
-    state->outputs_stale = instance->outputs_stale;
-    memcpy(state->data, instance->self, size);
-    *saved = state;
+    memcpy(saved->magic, MAGIC, sizeof MAGIC);
+    saved->size = size;
+    saved->mode = (int64_t)instance->mode;
+    saved->exchange = instance->exchange;
+    saved->start_time = instance->start_time;
+    saved->outputs_stale = instance->outputs_stale;
+    memcpy(saved->data, instance->self, size);
+    *state = saved;
     return true;
 }
 
-bool vi_instance_restore(vi_instance *instance, const char *function, const vi_saved *saved)
+bool vi_state_restore(vi_instance *instance, const char *function, const void *state)
 {
+    const vi_saved *saved = state;
+    if (instance == NULL) {
+        return false;
+    }
     if (saved == NULL || saved->size > vi_this_description.struct_size) {
         return vi_instance_fail(instance, function, "expected a saved state, got none");
     }
@@ -90,47 +97,63 @@ bool vi_instance_restore(vi_instance *instance, const char *function, const vi_s
     return true;
 }
 
-size_t vi_saved_size(const vi_saved *saved)
+bool vi_state_free(void **state)
 {
-    return sizeof(vi_saved) + saved->size;
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
+    return true;
 }
 
-void vi_saved_write(const vi_saved *saved, unsigned char *bytes)
+bool vi_state_size(const vi_instance *instance, const void *state, size_t *size)
 {
+    if (instance == NULL || state == NULL || size == NULL) {
+        return false;
+    }
+    *size = sizeof(vi_saved) + ((const vi_saved *)state)->size;
+    return true;
+}
+
+bool vi_state_write(const vi_instance *instance, const void *state, unsigned char *bytes, size_t size)
+{
+    const vi_saved *saved = state;
+    size_t needed;
+    if (!vi_state_size(instance, state, &needed) || bytes == NULL || size < needed) {
+        return false;
+    }
     vi_saved header = *saved;
     header.token_hash = token_hash();
     header.capacity = saved->size;
     header.state_hash = state_hash(&header, saved->data);
     memcpy(bytes, &header, sizeof header);
     memcpy(bytes + sizeof header, saved->data, saved->size);
+    return true;
 }
 
-vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size)
+bool vi_state_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size, void **state)
 {
     vi_saved header;
+    if (instance == NULL || bytes == NULL || state == NULL) {
+        return false;
+    }
     if (size < sizeof header) {
-        vi_instance_fail(instance, function, "expected a serialized state, got %lu bytes", (unsigned long)size);
-        return NULL;
+        return vi_instance_fail(instance, function, "expected a serialized state, got %lu bytes", (unsigned long)size);
     }
     memcpy(&header, bytes, sizeof header);
     const unsigned char *data = bytes + sizeof header;
     if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0 || header.token_hash != token_hash()
         || header.size != size - sizeof header || header.size > vi_this_description.struct_size
         || header.state_hash != state_hash(&header, data)) {
-        vi_instance_fail(instance, function, "these bytes are not an undamaged state of this component and version");
-        return NULL;
+        return vi_instance_fail(instance, function,
+                                "these bytes are not an undamaged state of this component and version");
     }
     vi_saved *saved = malloc(size);
     if (saved == NULL) {
-        vi_instance_fail(instance, function, "out of memory");
-        return NULL;
+        return vi_instance_fail(instance, function, "out of memory");
     }
     memcpy(saved, bytes, size);
     saved->capacity = header.size;
-    return saved;
-}
-
-void vi_saved_free(vi_saved *saved)
-{
-    free(saved);
+    *state = saved;
+    return true;
 }
