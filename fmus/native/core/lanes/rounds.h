@@ -1,4 +1,4 @@
-/* The lockstep of bodies of one mode. Included by one C file for each instruction set, which names VI_ROUNDS. */
+/* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
 #include "lanes/lane_group.h"
 #include "lanes/vector.h"
 
@@ -382,18 +382,5 @@ LANES_INLINE void run_rounds(vi_lane_group *g, int contacts)
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
             found |= one_round(g, at, contacts);
         }
-    }
-}
-
-#include "lanes/rounds_many.h"
-
-void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
-{
-    if (modes > 1) {
-        run_rounds_many(g, modes, contacts);
-    } else if (contacts < 2) {
-        run_rounds(g, 1); /* without a contact its place is that of an idle lane: nothing meets it */
-    } else {
-        run_rounds(g, 2);
     }
 }

@@ -10,7 +10,7 @@
 #endif
 #define VI_WIDTH 4
 #define VI_ROUNDS vi_lanes_rounds_avx2
-#include "lanes/rounds.h"
+#include "lanes/rounds_many.h"
 #if defined(__clang__)
 #pragma clang attribute pop
 #else

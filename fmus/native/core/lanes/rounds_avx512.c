@@ -10,7 +10,7 @@
 #endif
 #define VI_WIDTH 8
 #define VI_ROUNDS vi_lanes_rounds_avx512
-#include "lanes/rounds.h"
+#include "lanes/rounds_many.h"
 #if defined(__clang__)
 #pragma clang attribute pop
 #else

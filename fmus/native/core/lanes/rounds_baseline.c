@@ -2,4 +2,4 @@
 #define VI_WIDTH 2
 #define VI_ROUNDS vi_lanes_rounds_baseline
 #include "lanes/instructions.h"
-#include "lanes/rounds.h"
+#include "lanes/rounds_many.h"

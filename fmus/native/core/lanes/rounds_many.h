@@ -1,5 +1,6 @@
 /* The lockstep of bodies of several modes: certified cells of ever shorter length up to a contact, which is then for the
- * careful search. */
+ * careful search. Included by one C file for each instruction set, which names VI_ROUNDS, the lockstep of either kind. */
+#include "lanes/rounds.h"
 
 /* The rows of tables for the length of cells that each lane has now. */
 typedef struct {
@@ -158,5 +159,16 @@ LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
             found |= one_round_many(g, at, modes, contacts);
         }
+    }
+}
+
+void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
+{
+    if (modes > 1) {
+        run_rounds_many(g, modes, contacts);
+    } else if (contacts < 2) {
+        run_rounds(g, 1); /* without a contact its place is that of an idle lane: nothing meets it */
+    } else {
+        run_rounds(g, 2);
     }
 }
