@@ -8,16 +8,18 @@ import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from vibroimpact.analysis.files.atomic import refuse_special
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    import httpx
     import xarray as xr
 
     from vibroimpact.analysis.recording import Recording
-    from vibroimpact.service.client import Service
 
 ENDED = ("done", "failed", "cancelled")
 MOST_RECONNECTS = 20
@@ -41,6 +43,19 @@ class ServiceError(VibroimpactError):
         super().__init__(message)
 
 
+class Connection(Protocol):
+    """What asks a service: a `Service`."""
+
+    def ask(self, method: str, path: str, **request: Any) -> httpx.Response:
+        """Return the answer to a request."""
+
+    def told(self, method: str, path: str, **request: Any) -> dict[str, Any]:
+        """Return what the service tells: a JSON object."""
+
+    def stream(self, path: str, **request: Any) -> AbstractContextManager[httpx.Response]:
+        """Open an answer that comes in parts."""
+
+
 class RemoteJob:
     """A campaign on a service.
 
@@ -51,7 +66,7 @@ class RemoteJob:
         As the service told it last: `state`, `done`, `total`, `message`, ...
     """
 
-    def __init__(self, service: Service, status: dict[str, Any]) -> None:
+    def __init__(self, service: Connection, status: dict[str, Any]) -> None:
         self._service, self.status = service, status
         self.id: str = status["id"]
 
@@ -147,7 +162,7 @@ class RemoteRecording:
         As the service told it: `bytes`, `channels`, `created` too.
     """
 
-    def __init__(self, service: Service, status: dict[str, Any]) -> None:
+    def __init__(self, service: Connection, status: dict[str, Any]) -> None:
         self._service, self.status = service, status
         self.id: str = status["id"]
         self.name: str = status["name"]
@@ -170,7 +185,7 @@ class RemoteRecording:
         self._service.ask("DELETE", f"/recordings/{self.id}")
 
 
-def _fetched(service: Service, path: str, target: Path) -> Path:
+def _fetched(service: Connection, path: str, target: Path) -> Path:
     try:
         refuse_special(target)
     except OSError as error:
