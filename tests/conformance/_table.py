@@ -70,11 +70,11 @@ def section(outcomes: Iterable[Outcome], client: str, commit: str) -> str:
             reasons[why] += 1
     total = sum(numbers.values(), Counter())
     head = (
-        "`make conformance NI_TESTS=...` runs `tests/component` of a checkout of ni/nidaqmx-python on the virtual rig, "
-        f"unmodified, through NI's client. Last run: their commit {commit}, nidaqmx {client}: {total['passed']} pass, "
-        f"{total['refused']} meet a refusal with -200452 (the rig has no model of what they want), {total['skipped']} "
-        f"are skipped by NI's own fixtures (they look for another device), {total['not met']} do not apply (below), "
-        f"{total['failed']} fail."
+        "`make conformance NI_TESTS=...` runs `tests/component` of a checkout of ni/nidaqmx-python on the virtual rig,"
+        f"\nunmodified, through NI's client. Last run: their commit {commit}, nidaqmx {client}: "
+        f"{total['passed']} pass,\n{total['refused']} meet a refusal with -200452 (the rig has no model of what they "
+        f"want), {total['skipped']} are skipped by NI's own fixtures\n(they look for another device), "
+        f"{total['not met']} do not apply (below), {total['failed']} fail."
     )
     columns = ("passed", "refused", "skipped", "not met", "failed")
     rows = [

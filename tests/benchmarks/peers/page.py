@@ -30,7 +30,7 @@ def measurement(record: Mapping[str, Any]) -> str:
     """Return machine, goals, references and table in Markdown."""
     host = "; ".join(f"{key} {value}" for key, value in record["machine"].items())
     parts = [
-        f"Measured on {record['date']}: {host}.",
+        f"Measured on {record['date']}:\n{host}.",
         _goals(record),
         _references(record),
         _growth(record),
@@ -75,13 +75,13 @@ def _goals(record: Mapping[str, Any]) -> str:
     found = "met" if not grazes["failure"] and rest["rest_error"] is not None else "missed"
     seen = f"{grazes['impacts_seen']} of 11 grazes, no stop out of reach hit"
     lines.append(
-        f"- Goal: all grazes and the end of chatter are found by ours: **{found}** ({seen}; the end of chatter to "
-        f"{rest['rest_error']:.0e} of a period). Peers that find all grazes at one setting or more: "
+        f"- Goal: all grazes and the end of chatter are found by ours: **{found}**\n  ({seen}; the end of chatter to "
+        f"{rest['rest_error']:.0e} of a period).\n  Peers that find all grazes at one setting or more: "
         f"{', '.join(full) or 'none'}."
     )
     lines.append(
         f"- A fused run of one period costs {record['one_period'] * 1e6:.0f} us through `vi.run`'s runner, whatever "
-        "it does: much of what these short motions cost, which a longer one does not pay again."
+        "it does:\n  much of what these short motions cost, which a longer one does not pay again."
     )
     return "\n".join(lines)
 
@@ -94,7 +94,7 @@ def _references(record: Mapping[str, Any]) -> str:
     ]
     return (
         "The reference beside a second road, DOP853 at 1e-13 with nothing of this package, on "
-        f"grazes the flow in 40 digits (largest error, of both together): {', '.join(cells)}."
+        f"grazes the flow in 40 digits\n(largest error, of both together):\n{', '.join(cells)}."
     )
 
 
