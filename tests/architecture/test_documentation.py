@@ -1,4 +1,4 @@
-"""Pages lead to each other: no link into nowhere, no page that nobody finds."""
+"""Pages lead to each other, and their lines can be read: no link into nowhere, no page that nobody finds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from support.places import ROOT
 PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))]
 PACKAGES = ("fmus", "analysis", "orchestrator", "hardware")
 FOLDERS = sorted(page for package in PACKAGES for page in (ROOT / package).rglob("README.md"))
+ROOMS = (*PACKAGES, "service", "door", "examples", "tests")
+READMES = sorted(page for room in ROOMS for page in (ROOT / room).rglob("*.md") if "built" not in page.parts)
 SECTION = re.compile(r"^##+ (\d+(?:\.\d+)?)\b", re.MULTILINE)
 CITED = re.compile(r"equations\.md ((?:\d+(?:\.\d+)?(?:, | and | to )?)+)")
 FILE = re.compile(
     r"(?<![\w/.])(?:fmus|analysis|orchestrator|hardware|door|tests)/[\w/]+\.(?:py|c|h|toml|md)\b"
 )
 LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)]*)?\)")
+FENCED = re.compile(r"^ *```.*?^ *```$", re.MULTILINE | re.DOTALL)
+ENTRY = re.compile(r"^- .*\n(?:  .*\n)*", re.MULTILINE)
 
 
 def links(page: Path) -> list[str]:
@@ -58,3 +62,20 @@ def test_every_section_of_the_equations_that_code_cites_is_there() -> None:
     }
     assert len(cited) > 50
     assert sorted((path, number) for path, number in cited if number not in sections) == []
+
+
+def test_no_line_has_160_characters_but_in_blocks_tables_and_pictures() -> None:
+    long = [
+        f"{page.relative_to(ROOT)}: {line}"
+        for page in (*PAGES, *READMES)
+        for line in FENCED.sub("", page.read_text(encoding="utf-8")).splitlines()
+        if len(line) >= 160 and not line.lstrip().startswith(("|", "!["))
+    ]
+    assert long == []
+
+
+def test_the_changelog_has_two_lines_an_entry_at_most() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    entries = ENTRY.findall(text)
+    assert len(entries) == sum(line.startswith("- ") for line in text.splitlines())
+    assert [entry for entry in entries if entry.count("\n") > 2] == []
