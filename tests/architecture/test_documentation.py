@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -79,3 +80,17 @@ def test_the_changelog_has_two_lines_an_entry_at_most() -> None:
     entries = ENTRY.findall(text)
     assert len(entries) == sum(line.startswith("- ") for line in text.splitlines())
     assert [entry for entry in entries if entry.count("\n") > 2] == []
+
+
+def test_the_version_is_told_alike_by_the_changelog_the_citation_and_the_form_for_faults() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    places = {
+        "CHANGELOG.md": r"^## (\S+)",
+        "CITATION.cff": r"^version: (\S+)",
+        ".github/ISSUE_TEMPLATE/bug.yml": r"vibroimpact (\d[^\s,]*)",
+    }
+    told = {
+        name: re.findall(pattern, (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)[0]
+        for name, pattern in places.items()
+    }
+    assert told == dict.fromkeys(places, project["version"])

@@ -11,11 +11,13 @@ from vibroimpact.orchestrator.campaign.manifest import (
     add_build,
     differences,
     flat_scene,
+    read_content,
     read_manifest,
     refuse_other_runner,
     refuse_other_scene,
     runner_differences,
     scene_hash,
+    write_content,
     write_manifest,
 )
 from vibroimpact.orchestrator.campaign.shared_folder import answer_question, refuse_blind_workers
@@ -87,6 +89,19 @@ def test_a_build_that_is_added_is_known_and_the_manifest_sound(tmp_path: Path) -
     assert not runner_differences(manifest, other)
     assert not runner_differences(manifest, IDENTITY)
     assert runner_differences(manifest, RunnerIdentity("fused", "x86_64", {"body": "c" * 64}))
+
+
+def test_versions_of_packages_are_told_and_no_part_of_what_a_campaign_is(tmp_path: Path) -> None:
+    path = tmp_path / "campaign.json"
+    written(tmp_path)
+    content = read_content(path)
+    before = {name: "0.2.0" for name in content["versions"]}
+    assert before.keys() >= {"vibroimpact", "numpy"}
+    write_content(path, content | {"versions": before, "git_commit": "unknown"})
+    manifest = read_manifest(path)
+    assert manifest is not None
+    assert not differences(manifest.scene, flat_scene(scene_of(TEXT)))
+    assert not runner_differences(manifest, IDENTITY)
 
 
 def test_a_folder_without_a_manifest_has_none(tmp_path: Path) -> None:
