@@ -86,9 +86,9 @@ OpenedWorkers = Callable[[], AbstractContextManager["WorkerPool"]]
 
 def open_workers(**options: Any) -> AbstractContextManager[WorkerPool]:
     """Open workers, see `cluster.open_workers`: loaded by those who need any, since Dask takes half a second."""
-    from vibroimpact.orchestrator.campaign import cluster
+    from vibroimpact.orchestrator.campaign.cluster import open_workers as opened
 
-    return cluster.open_workers(**options)
+    return opened(**options)
 
 
 def run_campaign(
