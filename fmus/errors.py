@@ -7,12 +7,33 @@ outcome in the dataset, never an exception.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
+
+from vibroimpact.fmus.messages import joined, message, typed
 
 
 class VibroimpactError(Exception):
-    """Base of all errors of this package; `exit_code` is what the command line returns."""
+    """Base of all errors of this package; `exit_code` is what the command line returns.
+
+    Its text names arguments as Python writes them; `typed` is the text of the command line.
+    """
 
     exit_code = 1
+
+    @property
+    def message(self) -> str:
+        """The text, with both spellings where it names arguments."""
+        found = self.args[0] if self.args else ""
+        return found if isinstance(found, str) else str(found)
+
+    @property
+    def typed(self) -> str:
+        """The text with options in place of arguments."""
+        return typed(self.message)
+
+    def named(self, name: object) -> Self:
+        """Return the error with the name of a file, or of what else it is about, before its text."""
+        return type(self)(message(f"{name}: ", self.message))
 
 
 class UsageError(VibroimpactError):
@@ -34,7 +55,7 @@ class SceneError(VibroimpactError):
 
     def __init__(self, problems: Sequence[str]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(self.problems))
+        super().__init__(joined("\n", self.problems))
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[str, ...]]]:
         """Pickle the problems, not the message made of them: errors travel between processes."""

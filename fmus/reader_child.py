@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vibroimpact.fmus.confinement import confine, end_with_parent
+from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.processes.child import write_whole
 from vibroimpact.fmus.processes.fork import forked
 
@@ -78,6 +79,8 @@ def _raised(error: BaseException) -> dict[str, Any]:
         "error": type(error).__name__,
         "text": str(error)[:LONGEST_TEXT],
     }
+    if isinstance(error, VibroimpactError):
+        found["typed"] = error.typed[:LONGEST_TEXT]
     if isinstance(error, OSError):
         found |= {"system": True, "errno": error.errno, "reason": error.strerror or str(error)[:LONGEST_TEXT]}
     return found

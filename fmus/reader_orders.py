@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from vibroimpact.fmus.messages import Message
+
 #: Bytes of the line that answers, at most: names and remarks.
 LONGEST_LINE = 1 << 26
 
@@ -92,6 +94,7 @@ def received(stream: io.BufferedReader, most_bytes: int) -> Answer | None:
         if any(stream.readinto(buffer) != len(buffer) for buffer in buffers):
             raise ValueError("less bytes than were said")
         text, error = str(found.get("text", "")), str(found.get("error", ""))
+        text = Message(text, str(found.get("typed", text)))
         system = OSError(found["errno"], found["reason"]) if "system" in found else None
         return Answer(str(found["verdict"]), found.get("facts"), buffers, error, text, system)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError, MemoryError):

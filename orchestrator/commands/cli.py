@@ -265,7 +265,7 @@ def _no_current_folder() -> bool:
 def _words(error: Exception, *, debug: bool) -> str:
     """Return what to say of an error; of one that nobody foresaw, where a developer finds its place."""
     if isinstance(error, VibroimpactError):
-        return str(error)
+        return error.typed
     if isinstance(error, OSError) and error.errno in _FULL:
         return f"{error.filename or 'Output'}: cannot be written ({error.strerror})."
     hint = "" if debug else f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."

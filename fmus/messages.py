@@ -1,0 +1,119 @@
+"""Messages that name arguments: in Python by what a call writes, on the command line by the options that one types.
+
+Who makes a message does not know who reads it. So a message has both spellings, and whoever shows it takes one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Self
+
+_OPTIONS = {"baseline_window": "baseline", "start": "from", "stop": "to"}
+"""Options that have another name than the argument."""
+
+
+def option_of(argument: str) -> str:
+    """Return the option for an argument.
+
+    >>> option_of("start"), option_of("time_column")
+    ('--from', '--time-column')
+    """
+    return f"--{_OPTIONS.get(argument, argument).replace('_', '-')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Either:
+    """Words that differ where no argument is named."""
+
+    called: str
+    typed: str
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An argument of an operation, or a value for it, as a message names it.
+
+    >>> Argument("start").called, Argument("method", "threshold").called, Argument("events", False).called
+    ('start', "method='threshold'", 'events=False')
+    >>> Argument("start").typed, Argument("method", "threshold").typed, Argument("events", False).typed
+    ('--from', '--method threshold', '--no-events')
+    """
+
+    name: str
+    value: str | int | bool = ""
+
+    @property
+    def called(self) -> str:
+        """What Python writes."""
+        return self.name if self.value == "" else f"{self.name}={self.value!r}"
+
+    @property
+    def typed(self) -> str:
+        """What the command line writes."""
+        option = option_of(self.name)
+        return f"--no-{option[2:]}" if self.value is False else f"{option} {self.value}".rstrip()
+
+
+class Message(str):
+    """A text that names arguments: as Python writes them, with the words of the command line beside it.
+
+    Attributes
+    ----------
+    typed : str
+        The same with options.
+    """
+
+    __slots__ = ("typed",)
+    typed: str
+
+    def __new__(cls, called: str, typed: str) -> Self:
+        """Return a message of both spellings; `message` makes one of parts."""
+        made = super().__new__(cls, called)
+        made.typed = typed
+        return made
+
+    def __reduce__(self) -> tuple[type[Message], tuple[str, str]]:
+        """Pickle both spellings: errors travel between processes."""
+        return type(self), (str(self), self.typed)
+
+
+Part = str | Argument | Either
+
+
+def message(*parts: Part) -> Message:
+    """Return the parts as one message; those that are messages keep both spellings.
+
+    >>> made = message("Choose another", Either("", " with -o"), ", or widen ", Argument("start"), ".")
+    >>> made, made.typed
+    ('Choose another, or widen start.', 'Choose another with -o, or widen --from.')
+    """
+    return Message("".join(map(_called, parts)), "".join(map(typed, parts)))
+
+
+def joined(separator: str, texts: Iterable[str]) -> Message:
+    """Return texts as one, as `str.join` does."""
+    several = list(texts)
+    return Message(separator.join(several), separator.join(map(typed, several)))
+
+
+def reworded(text: str, change: Callable[[str], str]) -> str:
+    """Return a text that was changed, in both spellings where it has two.
+
+    >>> reworded(message("Give ", Argument("rate"), "."), str.upper).typed
+    'GIVE --RATE.'
+    """
+    return Message(change(text), change(text.typed)) if isinstance(text, Message) else change(text)
+
+
+def typed(text: Part) -> str:
+    """Return a text as the command line spells it.
+
+    >>> typed(message("Give ", Argument("time_column"), ".")), typed("a.toml: expected a file, got none.")
+    ('Give --time-column.', 'a.toml: expected a file, got none.')
+    """
+    return text if isinstance(text, str) and not isinstance(text, Message) else text.typed
+
+
+def _called(part: Part) -> str:
+    return part if isinstance(part, str) else part.called
