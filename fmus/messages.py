@@ -30,6 +30,12 @@ class Either:
     typed: str
 
 
+CALL = Either("call", "command")
+"""What is repeated: `The same call resumes.`"""
+WITH_OUTPUT = Either("", " with -o")
+"""How another file or folder is chosen."""
+
+
 @dataclass(frozen=True, slots=True)
 class Argument:
     """An argument of an operation, or a value for it, as a message names it.

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import message
 
 LOOPBACK = "127.0.0.1"
 """Address of this machine itself, over which processes of one campaign, rig or service talk."""
@@ -61,10 +62,12 @@ def refuse_few_descriptors(needed: int, whose: str, fewer: str = "") -> None:
     """
     available = _available_descriptors(needed)
     if available < needed:
-        other = f", or {fewer}" if fewer else ""
         raise UsageError(
-            f"this machine: expected {needed} files that may be opened for {whose}, got {available}. "
-            f"Raise the limit (`ulimit -n 1024`){other}."
+            message(
+                f"this machine: expected {needed} files that may be opened for {whose}, got {available}. "
+                "Raise the limit (`ulimit -n 1024`)",
+                *_or(fewer),
+            )
         )
 
 
@@ -100,8 +103,15 @@ def refuse_no_loopback(purpose: str, instead: str = "") -> None:
         ):
             return
     except OSError as error:
-        other = f", or {instead}" if instead else ""
         raise UsageError(
-            f"this machine: expected {LOOPBACK} to answer, over which {purpose}, got {error.strerror or error}. "
-            f"Set up the network interface of this machine itself (`ip link set lo up`){other}."
+            message(
+                f"this machine: expected {LOOPBACK} to answer, over which {purpose}, got {error.strerror or error}. "
+                "Set up the network interface of this machine itself (`ip link set lo up`)",
+                *_or(instead),
+            )
         ) from error
+
+
+def _or(other: str) -> tuple[str, ...]:
+    """Return the end of a sentence, with what else may be done."""
+    return (", or ", other, ".") if other else (".",)

@@ -11,7 +11,7 @@ from typing import Any
 from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import refuse_no_text
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
 DATASET_ENDING = ".nc"
@@ -98,8 +98,11 @@ def refuse_folder(folder: Path) -> None:
     _refuse_long_name(folder)
     if folder.suffix.lower() in FILE_ENDINGS and not folder.is_dir():
         raise UsageError(
-            f"{folder}: expected the name of a folder, got that of a file ({folder.suffix}). "
-            f"Choose another{typed_or_called(' with -o')}."
+            message(
+                f"{folder}: expected the name of a folder, got that of a file ({folder.suffix}). Choose another",
+                WITH_OUTPUT,
+                ".",
+            )
         )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import refuse_no_text
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 
 if sys.platform == "win32":
     import msvcrt
@@ -80,6 +80,9 @@ def make_folder(folder: Path) -> None:
 def not_writable(folder: Path, error: OSError) -> UsageError:
     """Return the error for a folder that cannot be written."""
     return UsageError(
-        f"{folder}: expected a folder that can be written, got {error.strerror}. "
-        f"Choose another{typed_or_called(' with -o')}."
+        message(
+            f"{folder}: expected a folder that can be written, got {error.strerror}. Choose another",
+            WITH_OUTPUT,
+            ".",
+        )
     )

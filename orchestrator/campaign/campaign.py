@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import CALL, WITH_OUTPUT, Message, message
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, ChunkResult, Work, get_ready
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
@@ -137,9 +137,13 @@ def run_campaign(
         except OSError as error:
             # Of this process or of a worker: the folder for temporary files may be full too.
             raise CampaignError(
-                f"{error.filename or home}: expected a file that can be read and written, got "
-                f"{error.strerror or error}. Make room or restore access, there and in the folder for temporary "
-                f"files; then the same {typed_or_called('command', 'call')} resumes."
+                message(
+                    f"{error.filename or home}: expected a file that can be read and written, got "
+                    f"{error.strerror or error}. Make room or restore access, there and in the folder for temporary "
+                    "files; then the same ",
+                    CALL,
+                    " resumes.",
+                )
             ) from error
 
 
@@ -191,8 +195,12 @@ class _Campaign:
         has_parts = self._parts_folder.is_dir() and own_files(self._parts_folder)
         if manifest is None and ((self._home / "dataset.nc").exists() or has_parts):
             raise UsageError(
-                f"{self._home}: expected an empty folder or one of a campaign, got data without "
-                f"campaign.json. Choose another folder{typed_or_called(' with -o')}."
+                message(
+                    f"{self._home}: expected an empty folder or one of a campaign, got data without campaign.json. "
+                    "Choose another folder",
+                    WITH_OUTPUT,
+                    ".",
+                )
             )
         return manifest
 
@@ -225,9 +233,12 @@ class _Campaign:
             handed_over = earlier.hand_over(self._scene, self._report.runs)
         except OSError as error:
             raise CampaignError(
-                f"{self._home}: the points of the earlier sweep could not be kept: {error.strerror or error}. "
-                f"They are where they were. "
-                f"Make room or restore access; then the same {typed_or_called('command', 'call')} goes on."
+                message(
+                    f"{self._home}: the points of the earlier sweep could not be kept: {error.strerror or error}. "
+                    "They are where they were. Make room or restore access; then the same ",
+                    CALL,
+                    " goes on.",
+                )
             ) from error
         if not handed_over:
             refuse_other_scene(self._manifest_path, different)
@@ -322,11 +333,12 @@ class _Campaign:
             )
             return None
 
-    def _interrupted(self) -> str:
+    def _interrupted(self) -> Message:
         done = self._report.resumed + self._report.outcomes.total()
-        return (
-            f"Interrupted: {done} of {self._report.runs} points are complete in {self._home}. "
-            f"The same {typed_or_called('command', 'call')} resumes."
+        return message(
+            f"Interrupted: {done} of {self._report.runs} points are complete in {self._home}. The same ",
+            CALL,
+            " resumes.",
         )
 
     def _compute_on(self, stages: Iterable[Stage], stored: Sequence[Path], workers: OpenedWorkers) -> None:
@@ -442,9 +454,13 @@ class _Campaign:
             return unfit
         except OSError as error:
             raise CampaignError(
-                f"{self._report.dataset}: could not be written: {error.strerror or error}. "
-                f"All points are complete in {self._parts_folder}. "
-                f"Make room or restore access; then the same {typed_or_called('command', 'call')} finishes."
+                message(
+                    f"{self._report.dataset}: could not be written: {error.strerror or error}. "
+                    f"All points are complete in {self._parts_folder}. "
+                    "Make room or restore access; then the same ",
+                    CALL,
+                    " finishes.",
+                )
             ) from error
         remove_parts(self._parts_folder)
         self._report.compaction_seconds = time.perf_counter() - began

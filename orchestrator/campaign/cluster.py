@@ -26,6 +26,7 @@ from distributed.utils import get_mp_context
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
+from vibroimpact.fmus.messages import CALL, Argument, Either, message
 from vibroimpact.fmus.processes.python_child import no_library_warns, safe_module_path
 from vibroimpact.fmus.surroundings import (
     LOOPBACK,
@@ -33,7 +34,6 @@ from vibroimpact.fmus.surroundings import (
     refuse_few_descriptors,
     refuse_no_loopback,
 )
-from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.processors import processor_count
@@ -155,23 +155,26 @@ def _reached_by(scheduler: str | Client) -> tuple[str, Security | None]:
 
 @contextmanager
 def _remote_cluster(address: str, security: Security | None) -> Iterator[Cluster]:
-    expected = f"{option('scheduler')} {address}: expected a Dask scheduler that listens there"
+    expected = message(Argument("scheduler"), f" {address}: expected a Dask scheduler that listens there")
     try:
         security = security or Security()
         certified = security.get_connection_args("client")["ssl_context"] is not None
     except OSError as error:
         raise UsageError(
-            f"{expected}, and certificates that can be read, got {error}. See docs/scaling.md."
+            message(expected, f", and certificates that can be read, got {error}. See docs/scaling.md.")
         ) from error
     if address.startswith("tls:") and not certified:
-        raise UsageError(f"{expected}, and certificates for TLS, got none. See docs/scaling.md.")
+        raise UsageError(message(expected, ", and certificates for TLS, got none. See docs/scaling.md."))
     try:
         client = _connected(address, security)
     except (OSError, ValueError) as error:
         raise UsageError(
-            f"{expected}, got no answer within {CONNECT_SECONDS:.0f} s. "
-            "Start one with `dask scheduler`, or leave the option out."
-            + (" Are the certificates those of the scheduler?" if certified else "")
+            message(
+                expected,
+                f", got no answer within {CONNECT_SECONDS:.0f} s. "
+                "Start one with `dask scheduler`, or leave the option out."
+                + (" Are the certificates those of the scheduler?" if certified else ""),
+            )
         ) from error
     try:
         yield Cluster(client)
@@ -249,9 +252,11 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
             # What they are forked from may be out of reach: somebody has cleaned the folder of its socket.
             dask.config.set({START: "spawn"})
     raise CampaignError(
-        f"this machine: expected {workers} workers that start, got a failure {MOST_STARTS} times: {failure}. "
-        f"Is there memory for them? With {option('workers')} there are fewer; "
-        f"the same {typed_or_called('command', 'call')} tries again."
+        message(
+            f"this machine: expected {workers} workers that start, got a failure {MOST_STARTS} times: {failure}. "
+            "Is there memory for them? With ",
+            *(Argument("workers"), " there are fewer; the same ", CALL, " tries again."),
+        )
     ) from failure
 
 
@@ -289,10 +294,10 @@ def _own_certificates(folder: Path) -> Security:
 
 def _refuse_poor_surroundings(workers: int) -> None:
     """Raise UsageError where workers of this machine cannot be started or reached."""
-    fewer = f"ask for fewer workers with {option('workers')}" if workers > 1 else ""
+    fewer = message("ask for fewer workers with ", Argument("workers")) if workers > 1 else ""
     whose = f"{workers} worker{'s' if workers > 1 else ''}"
     refuse_few_descriptors(OWN_DESCRIPTORS + workers * WORKER_DESCRIPTORS, whose, fewer)
-    instead = f"use {typed_or_called('`vibroimpact run`', 'vi.run')}, which needs none"
+    instead = message("use ", Either("vi.run", "`vibroimpact run`"), ", which needs none")
     refuse_no_loopback("workers are reached", instead)
 
 

@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
 from vibroimpact.orchestrator.run.provenance import git_commit, provenance, versions
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -337,8 +337,12 @@ def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
     hidden = len(different) - _MOST_DIFFERENCES
     more = f"; and {hidden} more" if hidden > 0 else ""
     raise UsageError(
-        f"{path.parent}: expected the scene that this campaign was started with, got a changed one: "
-        f"{shown}{more}. Choose another folder{typed_or_called(' with -o')}, or restore the scene to resume."
+        message(
+            f"{path.parent}: expected the scene that this campaign was started with, got a changed one: "
+            f"{shown}{more}. Choose another folder",
+            WITH_OUTPUT,
+            ", or restore the scene to resume.",
+        )
     )
 
 
@@ -368,8 +372,10 @@ def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") 
         With what differs, and the reason why the stored points do not show that results are the same all the same.
     """
     raise UsageError(
-        f"{path.parent}: expected the components and machine that this campaign was started with: "
-        f"{'; '.join(different)}. {reason}Results of two kinds are never mixed: choose another folder"
-        f"{typed_or_called(' with -o')}, "
-        "or go on with what it was started with."
+        message(
+            f"{path.parent}: expected the components and machine that this campaign was started with: "
+            f"{'; '.join(different)}. {reason}Results of two kinds are never mixed: choose another folder",
+            WITH_OUTPUT,
+            ", or go on with what it was started with.",
+        )
     )

@@ -17,7 +17,7 @@ from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 
 from vibroimpact.fmus.errors import CampaignError, UsageError, WorkersGoneError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import CALL, message
 from vibroimpact.orchestrator.run.progress import Progress
 
 WORKERLESS_SECONDS = 30.0
@@ -134,8 +134,12 @@ class WorkerPool:
             self._last_present = self._looked
         elif self._looked - self._last_present > WORKERLESS_SECONDS:
             raise WorkersGoneError(
-                f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
-                f"Start workers; then the same {typed_or_called('command', 'call')} resumes."
+                message(
+                    f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
+                    "Start workers; then the same ",
+                    CALL,
+                    " resumes.",
+                )
             )
         return tuple(sorted(there or ()))
 
@@ -301,8 +305,11 @@ class WorkerPool:
             return Finished(ticket, error=error, worker_lost=True)
         except (CancelledError, CommClosedError) as error:
             raise WorkersGoneError(
-                f"{self._where}: expected a scheduler that stays up, got none any more. "
-                f"The same {typed_or_called('command', 'call')} resumes."
+                message(
+                    f"{self._where}: expected a scheduler that stays up, got none any more. The same ",
+                    CALL,
+                    " resumes.",
+                )
             ) from error
         except Exception as error:
             # Whatever the work raised; who asked for the work knows what to make of it.
@@ -346,8 +353,12 @@ class WorkerPool:
     def _restart(self) -> None:
         """Connect anew and send all work again; a chunk that is computed twice gives the same part."""
         stalled = CampaignError(
-            f"{self._where}: expected workers that compute, got some that wait, or do not answer, while work is there. "
-            f"Was a clock set back? The same {typed_or_called('command', 'call')} resumes."
+            message(
+                f"{self._where}: expected workers that compute, got some that wait, or do not answer, while work is "
+                "there. Was a clock set back? The same ",
+                CALL,
+                " resumes.",
+            )
         )
         if self._restarts == MOST_RESTARTS:
             raise stalled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 
 def processor_count() -> int:
@@ -19,6 +19,8 @@ def refuse_two_kinds_of_workers(workers: int | None, scheduler: object) -> None:
     """Refuse workers of this machine beside those of a scheduler."""
     if workers is not None and scheduler is not None:
         raise UsageError(
-            f"{option('workers')} and {option('scheduler')}: expected one of them, got both. "
-            "A scheduler has its own workers."
+            message(
+                *(Argument("workers"), " and ", Argument("scheduler")),
+                ": expected one of them, got both. A scheduler has its own workers.",
+            )
         )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.pool import WorkerPool
@@ -51,6 +51,10 @@ def refuse_blind_workers(pool: WorkerPool, folder: Path) -> None:
         (folder / answer).unlink(missing_ok=True)
     if blind:
         raise UsageError(
-            f"{folder}: expected a folder that every worker reads and writes, got {len(blind)} that do not: "
-            f"{', '.join(sorted(blind)[:5])}. Choose a folder on a shared file system{typed_or_called(' with -o')}."
+            message(
+                f"{folder}: expected a folder that every worker reads and writes, got {len(blind)} that do not: "
+                f"{', '.join(sorted(blind)[:5])}. Choose a folder on a shared file system",
+                WITH_OUTPUT,
+                ".",
+            )
         )

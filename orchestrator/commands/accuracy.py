@@ -17,7 +17,6 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
-from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.operations.accuracy import Accuracy
@@ -43,9 +42,7 @@ def study_scene(options: Accuracy) -> None:
     tolerance, quantity, path, write = options.tolerance, options.of, options.scene, options.write
     refuse_misuse(tolerance, quantity, options.budget)
     if write is not None and tolerance is None:
-        raise UsageError(
-            f"{option('write')}: expected a tolerance to tune for, got none. Add {option('tolerance')} 1e-6."
-        )
+        raise UsageError("--write: expected a tolerance to tune for, got none. Add --tolerance 1e-6.")
     opened = opened_scene(path, options.changes or ())
     if write is not None:
         refuse_outputs([path], write, ending=".toml")
@@ -171,7 +168,7 @@ def _write_tuned(text: str, study: Study, target: Path) -> None:
     settings = {key.partition(".")[2]: value for key, value in chosen.way.changes.items()}
     if not settings:
         raise UsageError(
-            f"{option('write')}: expected a way that a scene can ask for, got {chosen.way.label}. "
+            f"--write: expected a way that a scene can ask for, got {chosen.way.label}. "
             "It is the cheapest all the same."
         )
     reason = (

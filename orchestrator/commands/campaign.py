@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_folder
+from vibroimpact.fmus.messages import typed
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
@@ -60,5 +61,5 @@ def computed(
         with shown_progress() as progress:
             return run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
     except CampaignInterrupted as interrupted:
-        say(str(interrupted), err=True)
+        say(typed(interrupted.args[0]), err=True)
         raise typer.Exit(130) from None

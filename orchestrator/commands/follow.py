@@ -14,6 +14,7 @@ from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwrit
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit, FollowSettings
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
+from vibroimpact.fmus.messages import typed
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.commands.beginning import Begun, begun, files_of, refuse_contradictions
@@ -90,7 +91,7 @@ def show_branches(options: Follow) -> None:
     _print(followed)
     if first.seed is None and first.impacts is None and not (interrupted or failure):
         for line in orbits_not_followed(followed, options.start, options.stop):
-            say(line)
+            say(typed(line))
     _print_loci(loci)
     _write(loci if loci.loci else followed, output, figure)
     if loci.loci and output is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs
+from vibroimpact.fmus.messages import typed
 from vibroimpact.fmus.terminal import note, say
 from vibroimpact.orchestrator.operations.ssp_export import ExportSsp
 from vibroimpact.orchestrator.operations.ssp_import import ImportSsp
@@ -23,7 +24,7 @@ def export_to_archive(options: ExportSsp) -> None:
         fmi=options.fmi,
         gains=options.gains,
         platform=options.platform,
-        note=note,
+        note=lambda text: note(typed(text)),
     )
     say(str(written))
 

@@ -15,7 +15,7 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset.results import described
 from vibroimpact.fmus.errors import ComponentError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase
 from vibroimpact.orchestrator.hard_cases.finding import CASES as FINDING
 from vibroimpact.orchestrator.hard_cases.impacts import CASES as IMPACTS
@@ -32,6 +32,7 @@ CASES: tuple[HardCase, ...] = (
     *(*YIELDING, *SEVERAL, *SCALES, *LIMITS),
 )
 """In the order of docs/hard_cases.md."""
+_ONLY = Argument("only")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +82,9 @@ def cases_named(names: Sequence[str]) -> list[HardCase]:
         if name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"Did you mean {near[0]}?" if near else f"There are {', '.join(known)}."
-            raise UsageError(f"{option('only')}: expected the name of a hard case, got {name!r}. {hint}")
+            raise UsageError(message(_ONLY, f": expected the name of a hard case, got {name!r}. {hint}"))
         if times > 1:
-            raise UsageError(f"{option('only')}: expected each name once, got {name!r} {times} times.")
+            raise UsageError(message(_ONLY, f": expected each name once, got {name!r} {times} times."))
     return [case for case in CASES if not asked or case.name in asked]
 
 
@@ -92,7 +93,7 @@ def _as_texts(names: object) -> list[str]:
     listed: list[str] = []
     for name in names if isinstance(names, Iterable) else [names]:
         if not isinstance(name, str):
-            raise UsageError(f"{option('only')}: expected the name of a hard case, got {name!r}.")
+            raise UsageError(message(_ONLY, f": expected the name of a hard case, got {name!r}."))
         listed.append(name)
     return listed
 

@@ -25,7 +25,7 @@ from vibroimpact.analysis.orbits.following import (
 from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import Argument, Either, Message, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import orbit_of_run
 from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
@@ -272,9 +272,11 @@ def follow_branches(
             _both_ways(follower, orbit, value, result, told)
     if not result.branches:
         raise OrbitError(
-            f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of {parameter} "
-            f"from {settings.lowest:g} to {settings.highest:g}, got none. "
-            + _other_orbits(scene, parameter, settings, (impacts or 1, periods))
+            message(
+                f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of "
+                f"{parameter} from {settings.lowest:g} to {settings.highest:g}, got none. ",
+                _other_orbits(scene, parameter, settings, (impacts or 1, periods)),
+            )
         )
     _doubled(follower, result, doublings, told)
     return result
@@ -287,7 +289,8 @@ def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought
     if not ends:
         return "Try another range, or other impacts and periods: no run at these values ends on an orbit."
     (impacts, periods), count = ends.most_common(1)[0]
-    return f"Try {_asking(impacts, periods)}: runs at {count} of these values end on P({impacts},{periods})."
+    runs = f": runs at {count} of these values end on P({impacts},{periods})."
+    return message("Try ", _asking(impacts, periods), runs)
 
 
 def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[str]:
@@ -306,8 +309,11 @@ def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[s
         orbit for value, orbit in ends if not _is_known(followed.branches, orbit, value, settings)
     )
     return [
-        f"Runs at {count} of {SEEDS} values of the range end on P({impacts},{periods}), which is not followed here: "
-        f"{_asking(impacts, periods)}."
+        message(
+            f"Runs at {count} of {SEEDS} values of the range end on P({impacts},{periods}), which is not followed "
+            "here: ",
+            *(_asking(impacts, periods), "."),
+        )
         for (impacts, periods), count in missed.most_common()
     ]
 
@@ -327,11 +333,9 @@ def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
     return Counter((orbit.phases.size, orbit.periods) for orbit in orbits)
 
 
-def _asking(impacts: int, periods: int) -> str:
+def _asking(impacts: int, periods: int) -> Message:
     """Return what asks for orbits of some impacts and periods."""
-    return typed_or_called(
-        f"--impacts {impacts} --periods {periods}", f"impacts={impacts}, periods={periods}"
-    )
+    return message(Argument("impacts", impacts), Either(", ", " "), Argument("periods", periods))
 
 
 def _orbit_of_run_at(scene: Scene, parameter: str, value: float) -> PeriodicOrbit | None:

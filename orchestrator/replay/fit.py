@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.replay.alignment import Interpolated
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.fmus.errors import ComponentError, EstimationError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.replay.covariance import LagSlopes, covariance_of, lag_slopes
 from vibroimpact.orchestrator.replay.replayer import Replayer
 from vibroimpact.orchestrator.replay.scoring import compare_motion
@@ -96,14 +96,20 @@ def fit_keys(scene: Scene, text: str) -> tuple[str, ...]:
     keys = tuple(key.strip() for key in text.split(",") if key.strip())
     if not keys or len(set(keys)) < len(keys):
         raise UsageError(
-            f"{option('fit')}: expected keys such as body.damping_ratio,sensor.gain, each once, got {text!r}."
+            message(
+                Argument("fit"),
+                f": expected keys such as body.damping_ratio,sensor.gain, each once, got {text!r}.",
+            )
         )
     for key in keys:
         scene.value(key)
         if key == MODES or numeric_key(key).table == "execution":
             raise UsageError(
-                f"{option('fit')}: expected numbers of what moves that change without steps, got {key}. "
-                "A sweep of it is scored at each value: `vibroimpact campaign`."
+                message(
+                    Argument("fit"),
+                    f": expected numbers of what moves that change without steps, got {key}. "
+                    "A sweep of it is scored at each value: `vibroimpact campaign`.",
+                )
             )
     return keys
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from vibroimpact.analysis.replay.trust import Verdict, trust
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option, typed_or_called
+from vibroimpact.fmus.messages import Argument, Either, message
 from vibroimpact.orchestrator.replay.fit import ReplayFit, fit_keys, fit_replay
 from vibroimpact.orchestrator.replay.output import Replayed, replay_dataset
 from vibroimpact.orchestrator.replay.replayer import (
@@ -86,15 +86,19 @@ def replay_scene(
     """
     if any(axis.key != "replay.recording" for axis in scene.sweep):
         raise UsageError(
-            f"{scene.source}: sweep: expected no sweep for one dataset. "
-            + typed_or_called("Give a folder with -o for a campaign.", "campaign(scene, folder) takes it.")
+            message(
+                f"{scene.source}: sweep: expected no sweep for one dataset. ",
+                Either("campaign(scene, folder) takes it.", "Give a folder with -o for a campaign."),
+            )
         )
     named = with_recordings(scene, recordings)
     paths = [recording_of(named, number) for number in range(1, len(replay_table(named).recordings) + 1)]
     if score and fit is None:
         raise UsageError(
-            f"{option('score')}: expected {option('fit')} beside it: "
-            "a recording is scored with numbers fitted on others."
+            message(
+                *(Argument("score"), ": expected ", Argument("fit")),
+                " beside it: a recording is scored with numbers fitted on others.",
+            )
         )
     _refuse_scoring_fitted(paths, score)
     keys = fit_keys(scene, fit) if fit is not None else ()
@@ -117,8 +121,11 @@ def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
     there = replay_table(scene).recordings
     if there and recordings:
         raise UsageError(
-            f"{scene.source}: replay.recordings: expected recordings in the scene or "
-            f"{typed_or_called('on the command line', 'in the call')}, got both."
+            message(
+                f"{scene.source}: replay.recordings: expected recordings in the scene or ",
+                Either("in the call", "on the command line"),
+                ", got both.",
+            )
         )
     if not recordings:
         if not there:
@@ -136,7 +143,10 @@ def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> Non
     for path in scored:
         if path.resolve() in fitted:
             raise UsageError(
-                f"{option('score')}: expected a recording that is not fitted, got {path}, which is. Score another one."
+                message(
+                    Argument("score"),
+                    f": expected a recording that is not fitted, got {path}, which is. Score another one.",
+                )
             )
 
 

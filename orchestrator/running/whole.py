@@ -14,7 +14,7 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
 from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import Runner
 from vibroimpact.orchestrator.run.dataset import tally
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
@@ -148,6 +148,10 @@ def _refuse_unwritable(target: Path) -> None:
 
 def _unwritable(target: Path, error: OSError) -> UsageError:
     return UsageError(
-        f"{target}: expected a place where a dataset can be written, got {error.strerror or error}. "
-        f"Choose another{typed_or_called(' with -o')}."
+        message(
+            f"{target}: expected a place where a dataset can be written, got {error.strerror or error}. "
+            "Choose another",
+            WITH_OUTPUT,
+            ".",
+        )
     )

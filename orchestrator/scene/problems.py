@@ -18,6 +18,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from vibroimpact.fmus.messages import reworded
 from vibroimpact.fmus.safe_toml import TooDeepError
 from vibroimpact.orchestrator.scene.fields import (
     Rule,
@@ -70,9 +71,9 @@ class Problem:
 
     def line(self, source: str) -> str:
         """Return the problem as the line that a user reads."""
-        where = f"{source}: {self.key}: " if self.key else f"{source}: "
         hint = self.hint if isinstance(self.hint, str) else self.hint()
-        return f"{where}expected {self.expected}, got {self.got}.{f' {hint}' if hint else ''}"
+        said = f"expected {self.expected}, got {self.got}.{f' {hint}' if hint else ''}"
+        return reworded(self.key, lambda key: f"{source}: {key}: {said}" if key else f"{source}: {said}")
 
 
 def lines_of(problems: Sequence[Problem], source: str, changed: Collection[str] = ()) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field, field_serializer
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import Either, Message, message
 from vibroimpact.orchestrator.scene.body_models import Body
 from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
 from vibroimpact.orchestrator.scene.draft import with_swept_keys
@@ -411,15 +411,16 @@ class Scene(SceneTable):
             lines = [self._left_to_the_sweep(axis) for axis in self.sweep if is_missing(document, axis.key)]
             raise SceneError(lines) if lines else error from error
 
-    def _left_to_the_sweep(self, axis: SweepAxis) -> str:
+    def _left_to_the_sweep(self, axis: SweepAxis) -> Message:
         value = f"{axis.values[0]:g}"
-        give = typed_or_called(
-            f"--set 'sweep={{}}' --set '{axis.key}={value}'",
-            f'with_values({{"sweep": {{}}, "{axis.key}": {value}}})',
-        )
-        return (
+        return message(
             f"{self.source}: {axis.key}: expected a value beside those of the sweep, which is left out here, got none. "
-            f"Add it to the scene, or give it: {give}."
+            "Add it to the scene, or give it: ",
+            Either(
+                f'with_values({{"sweep": {{}}, "{axis.key}": {value}}})',
+                f"--set 'sweep={{}}' --set '{axis.key}={value}'",
+            ),
+            ".",
         )
 
     def to_toml(self) -> str:

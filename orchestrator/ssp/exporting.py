@@ -7,11 +7,11 @@ from pathlib import Path
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
-from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp.members import Travel, component_members
 from vibroimpact.orchestrator.ssp.names import SSD_FILE, VERSIONS
@@ -79,7 +79,7 @@ def export_system(
         (gains, GAINS, "gains"),
     ):
         if given not in known:
-            raise UsageError(f"{option(what)}: expected {' or '.join(known)}, got {given!r}.")
+            raise UsageError(message(Argument(what), f": expected {' or '.join(known)}, got {given!r}."))
     duration = scene.record.transient_time + scene.record.recorded_time
     fmi = fmi or ("2.0" if ssp == "1.0" else None)
     with ScratchFolder("ssp") as folder:
@@ -92,15 +92,18 @@ def export_system(
     try:
         members[SSD_FILE] = description(scene, general, parts, ssp, duration)
     except SceneError as error:
-        raise UsageError(str(error)) from None
+        raise UsageError(error.message) from None
     members |= swept_members(scene, parts, ssp)
     target = Path(output)
     write_fmu(target, members)
     springs = [part.name for part in parts.values() if part.gain_of is not None]
     if springs:
         note(
-            f"{', '.join(springs)}: each gain is a component; a tool that exchanges values once a step answers one "
-            f"step later through it than with {option('gains')} transformation"
+            message(
+                f"{', '.join(springs)}: each gain is a component; a tool that exchanges values once a step answers one "
+                "step later through it than with ",
+                *(Argument("gains"), " transformation"),
+            )
         )
     for component in general.components:
         if component.tolerance is not None:

@@ -18,6 +18,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, SceneError, UsageError
+from vibroimpact.fmus.messages import reworded
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.members import OWN_DIGITS
 from vibroimpact.fmus.safe_toml import parse_toml
@@ -183,8 +184,11 @@ def _told_of(path: FilePath, source: str) -> Iterator[None]:
     except RefusalError as refusal:
         raise SceneError([refusal.problem.line(str(path))]) from None
     except SceneError as error:
-        lines = (line.replace(source, str(path)).replace(f"{place}/", "") for line in error.problems)
-        raise SceneError(list(lines)) from None
+
+        def named(line: str) -> str:
+            return line.replace(source, str(path)).replace(f"{place}/", "")
+
+        raise SceneError([reworded(line, named) for line in error.problems]) from None
     except ComponentFileError as error:
         raise ComponentFileError(str(error).replace(f"{place}/", f"{path}: ")) from None
 

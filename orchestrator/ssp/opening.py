@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.scene import Scene, load_scene
 
 ENDING = ".ssp"
@@ -87,6 +87,9 @@ def refuse_system_elsewhere(path: str | PathLike[str], scheduler: object) -> Non
     """
     if scheduler is not None and is_system(path):
         raise UsageError(
-            f"{option('scheduler')}: expected a scene file with its FMUs where all workers see them, got {path}. "
-            "Import the system first: vibroimpact ssp import."
+            message(
+                Argument("scheduler"),
+                f": expected a scene file with its FMUs where all workers see them, got {path}. "
+                "Import the system first: vibroimpact ssp import.",
+            )
         )

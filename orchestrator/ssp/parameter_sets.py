@@ -8,9 +8,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.packaging.zip_members import opened
 from vibroimpact.fmus.safe_xml import LARGEST_XML, root_of
-from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.general.scene import gain_place
 from vibroimpact.orchestrator.ssp.archive import SspArchive
@@ -19,6 +19,7 @@ from vibroimpact.orchestrator.ssp.scene_tables import names_of
 from vibroimpact.orchestrator.ssp.values import Parameter, read_parameter_set
 
 Sets = Mapping[str, tuple[Parameter, ...]]
+_PARAMETERS = Argument("parameters")
 
 
 def read_sets(archive: SspArchive, files: Sequence[FilePath]) -> dict[str, tuple[Parameter, ...]]:
@@ -33,7 +34,7 @@ def read_sets(archive: SspArchive, files: Sequence[FilePath]) -> dict[str, tuple
                 raise ComponentFileError(f"{file}: expected XML of at most {LARGEST_XML} bytes, got more.")
             root = root_of(content, name, namespaces=True)
         else:
-            root = archive.xml(archive.member(file.as_posix(), option("parameters")))
+            root = archive.xml(archive.member(file.as_posix(), message(_PARAMETERS)))
         sets[name] = read_parameter_set(root, name)
     return sets
 
@@ -115,24 +116,31 @@ def _axes(points: list[dict[str, StartValue]]) -> dict[str, list[StartValue]]:
     lacking = next((key for key in keys if any(key not in point for point in points)), None)
     if lacking is not None:
         raise UsageError(
-            f"{option('parameters')}: expected sets of the same parameters, got some without {lacking}. "
-            "Write it into each."
+            message(
+                _PARAMETERS,
+                f": expected sets of the same parameters, got some without {lacking}. Write it into each.",
+            )
         )
     values = {key: list(dict.fromkeys(point[key] for point in points)) for key in keys}
     axes = {key: several for key, several in values.items() if len(several) > 1}
     different = {tuple(point[key] for key in axes) for point in points}
     if len(different) != len(points):
-        raise UsageError(f"{option('parameters')}: expected sets that differ, got two that say the same.")
+        raise UsageError(message(_PARAMETERS, ": expected sets that differ, got two that say the same."))
     if math.prod(map(len, axes.values())) != len(points):
         raise UsageError(
-            f"{option('parameters')}: expected sets that differ in one number, or all combinations of several, got "
-            f"{len(points)} sets of {', '.join(axes)}. Import each set by itself."
+            message(
+                _PARAMETERS,
+                ": expected sets that differ in one number, or all combinations of several, got "
+                f"{len(points)} sets of {', '.join(axes)}. Import each set by itself.",
+            )
         )
     wrong = next((key for key, several in axes.items() if not all(map(_is_number, several))), None)
     if wrong is not None:
         raise UsageError(
-            f"{option('parameters')}: expected sets that differ in numbers, got different {wrong}. "
-            "Import each set by itself."
+            message(
+                _PARAMETERS,
+                f": expected sets that differ in numbers, got different {wrong}. Import each set by itself.",
+            )
         )
     return axes
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.references import Reference
@@ -80,7 +80,10 @@ def refuse_unreached(study: Study) -> None:
             f"{best.error(study.quantity) + own:.1e} by {best.way.label}, the reference known to {own:.0e}"
         )
     raise UsageError(
-        f"{option('tolerance')}: expected one that a way reaches, got {study.tolerance:g}; reached was {reached}."
+        message(
+            Argument("tolerance"),
+            f": expected one that a way reaches, got {study.tolerance:g}; reached was {reached}.",
+        )
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.run.carried_state import on_free_side
 from vibroimpact.orchestrator.run.parameters import oscillator_start
 from vibroimpact.orchestrator.scene import Scene
@@ -205,8 +205,11 @@ def _refuse(budget: Budget, share: float, found: Observation, what: str) -> None
         else f"far more than {budget.seconds:g} s"
     )
     raise UsageError(
-        f"{option('budget')}: expected {needed} of processor time, got {budget.seconds:g}: {what} takes more than "
-        f"{share * budget.seconds:.2g} s by the fused way, of all ways the cheapest."
+        message(
+            Argument("budget"),
+            f": expected {needed} of processor time, got {budget.seconds:g}: {what} takes more than "
+            f"{share * budget.seconds:.2g} s by the fused way, of all ways the cheapest.",
+        )
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from numbers import Real
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET
 from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
@@ -43,14 +43,18 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
     vibroimpact.fmus.errors.UsageError: budget: expected a finite processor time of 10 s or more, got 2.0.
     """
     if quantity not in ("all", *QUANTITIES):
-        raise UsageError(f"{option('of')}: expected all, {', '.join(QUANTITIES)}, got {quantity!r}.")
+        raise UsageError(
+            message(Argument("of"), f": expected all, {', '.join(QUANTITIES)}, got {quantity!r}.")
+        )
     if not (_is_between(0.0, budget) and budget >= LEAST_BUDGET):
         least = f"expected a finite processor time of {LEAST_BUDGET:g} s or more"
-        raise UsageError(f"{option('budget')}: {least}, got {budget!r}.")
+        raise UsageError(message(Argument("budget"), f": {least}, got {budget!r}."))
     if tolerance is None:
         return
     if not _is_between(0.0, tolerance):
-        raise UsageError(f"{option('tolerance')}: expected a relative error > 0, got {tolerance!r}.")
+        raise UsageError(
+            message(Argument("tolerance"), f": expected a relative error > 0, got {tolerance!r}.")
+        )
     if tolerance < LEAST_TOLERANCE:
         _refuse_tolerance(tolerance, LEAST_TOLERANCE, "as double precision has it")
 
@@ -77,5 +81,8 @@ def _is_between(low: float, value: object) -> bool:
 
 def _refuse_tolerance(tolerance: float, least: float, why: str) -> None:
     raise UsageError(
-        f"{option('tolerance')}: expected a relative error of {least:.1e} or more, {why}, got {tolerance:g}."
+        message(
+            Argument("tolerance"),
+            f": expected a relative error of {least:.1e} or more, {why}, got {tolerance:g}.",
+        )
     )
