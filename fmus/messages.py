@@ -5,9 +5,9 @@ Who makes a message does not know who reads it. So a message has both spellings,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 _OPTIONS = {"baseline_window": "baseline", "start": "from", "stop": "to"}
 """Options that have another name than the argument."""
@@ -85,6 +85,8 @@ class Message(str):
 
 
 Part = str | Argument | Either
+Spelling = Callable[[str], str]
+"""From a message to the text that is shown: `typed`, or `str` for Python's spelling of arguments."""
 
 
 def message(*parts: Part) -> Message:
@@ -110,6 +112,24 @@ def reworded(text: str, change: Callable[[str], str]) -> str:
     'GIVE --RATE.'
     """
     return Message(change(text), change(text.typed)) if isinstance(text, Message) else change(text)
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text.
+
+    >>> [line.typed for line in lines_of(message("Give ", Argument("rate"), ".\\nOr not."))]
+    ['Give --rate.', 'Or not.']
+    """
+    if not isinstance(text, Message):
+        return text.splitlines()
+    return [Message(*line) for line in zip(text.splitlines(), text.typed.splitlines(), strict=True)]
+
+
+def spelled(attributes: Mapping[str, Any], spelling: Spelling) -> dict[str, Any]:
+    """Return attributes as they are written to a file: their messages in one spelling, that of `typed` or `str`."""
+    return {
+        name: spelling(value) if isinstance(value, Message) else value for name, value in attributes.items()
+    }
 
 
 def typed(text: Part) -> str:

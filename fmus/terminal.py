@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
 from typing import Any
 
 import typer
 from rich.console import Console
 from rich.text import Text
 
-from vibroimpact.fmus.messages import typed
+from vibroimpact.fmus.messages import Spelling, typed
 from vibroimpact.fmus.printable import printable
 
 _PIPE_WIDTH = 160
@@ -60,20 +59,20 @@ class Terminal(Console):
 
     Parameters
     ----------
-    spelled : callable
-        From a message to the text that is shown: `typed`, or `str` for Python's spelling of arguments.
+    spelling : callable
+        What it shows of messages: see `messages.Spelling`.
     options
         Those of rich.
     """
 
-    def __init__(self, spelled: Callable[[str], str] = typed, **options: Any) -> None:
+    def __init__(self, spelling: Spelling = typed, **options: Any) -> None:
         plain = {"markup": False, "highlight": False, "emoji": False}
-        self._spelled = spelled
+        self.spelling = spelling
         super().__init__(**{**plain, **options})
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Return a text as it is shown; everything that is printed as a string passes here."""
-        return super().render_str(printable(self._spelled(text)), **options)
+        return super().render_str(printable(self.spelling(text)), **options)
 
     def on_broken_pipe(self) -> None:
         """Go on without a reader."""
@@ -91,9 +90,9 @@ class Terminal(Console):
         _write_no_more(self.stderr, error)
 
 
-def wide_terminal(spelled: Callable[[str], str] = typed) -> Terminal:
+def wide_terminal(spelling: Spelling = typed) -> Terminal:
     """Return a console whose tables are as wide as they need to be where they go to a pipe, which has no width."""
-    console = Terminal(spelled)
+    console = Terminal(spelling)
     if not console.is_terminal:
         console.width = _PIPE_WIDTH
     return console

@@ -86,4 +86,4 @@ def estimate(folder: Path, options: dict[str, Any]) -> None:
     declared = ESTIMATES[asked["kind"]]
     given = {field.name: asked[key] for key, field, _ in _offered(declared)}
     place: dict[str, Any] = {"data": folder / options["data"], "output": folder / OUTPUT, "force": True}
-    declared(**place, **given).carry_out()
+    declared(**place, **given).carry_out(spelling=str)  # its arguments have the names of Python

@@ -27,7 +27,7 @@ def show_classes(options: Classify) -> None:
         try:
             classes = classify(dataset)
         except DatasetError as problem:
-            raise DatasetError(f"{file}: {problem}") from problem
+            raise problem.named(file) from problem
         units = dataset.attrs["units_system"]
     _print(classes)
     if output is None and figure is None:

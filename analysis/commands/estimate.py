@@ -36,16 +36,17 @@ from vibroimpact.analysis.operations.estimate_impacts import EstimateImpacts
 from vibroimpact.analysis.operations.estimate_response import EstimateResponse
 from vibroimpact.analysis.recording import Channel, Recording, is_recording, open_signals
 from vibroimpact.fmus.errors import EstimationError, UsageError
+from vibroimpact.fmus.messages import Spelling, spelled, typed
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 Estimation = EstimateDecay | EstimateImpacts | EstimateBounces | EstimateResponse
 """Estimations, which all say data, channel, window, run, places."""
 
 
-def decay_of(options: EstimateDecay) -> None:
+def decay_of(options: EstimateDecay, spelling: Spelling = typed) -> None:
     """Estimate a free decay: with all damping laws, none, or one."""
     law = options.law
-    with _estimating(options) as console:
+    with _estimating(options, spelling) as console:
         laws = () if law == "none" else ALL_LAWS if law == "all" else (damping_law(law),)
         recording = open_signals(options.data, options.run)
         samples = decay_samples(_channel(recording, options.channel), options.start, options.stop_time)
@@ -54,10 +55,10 @@ def decay_of(options: EstimateDecay) -> None:
     _write(console, _sourced(found.dataset(), options.data, recording), options)
 
 
-def impacts_of(options: EstimateImpacts) -> None:
+def impacts_of(options: EstimateImpacts, spelling: Spelling = typed) -> None:
     """Estimate motion against a stop, with or without a force that oscillates."""
     refuse_numbers(options)
-    with _estimating(options) as console:
+    with _estimating(options, spelling) as console:
         recording = open_signals(options.data, options.run)
         channel = _channel(recording, options.channel)
         forcing, known = forcing_and_known(options, recording, channel)
@@ -72,12 +73,12 @@ def impacts_of(options: EstimateImpacts) -> None:
     _write(console, _sourced(dataset, options.data, recording), options)
 
 
-def bounces_of(options: EstimateBounces) -> None:
+def bounces_of(options: EstimateBounces, spelling: Spelling = typed) -> None:
     """Estimate the restitution of a body that bounces under a constant force."""
     side = options.side
     if side not in (None, "upper", "lower"):
         raise UsageError(f'--side: expected upper or lower, got "{side}".')
-    with _estimating(options) as console:
+    with _estimating(options, spelling) as console:
         recording = open_signals(options.data, options.run)
         channel = _channel(recording, options.channel)
         seen = side or side_of_stop(options.data, options.run, recording, channel)
@@ -87,12 +88,12 @@ def bounces_of(options: EstimateBounces) -> None:
     _write(console, _sourced(dataset, options.data, recording), options)
 
 
-def response_of(options: EstimateResponse) -> None:
+def response_of(options: EstimateResponse, spelling: Spelling = typed) -> None:
     """Estimate a resonance from two channels, or from a simulated sweep of the frequency."""
     drive, band, estimator = options.drive, options.band, options.estimator
     if estimator not in ("h1", "h2"):
         raise UsageError(f'--estimator: expected h1 or h2, got "{estimator}".')
-    with _estimating(options) as console:
+    with _estimating(options, spelling) as console:
         if drive is None and is_recording(options.data):
             raise UsageError("--drive: expected the channel that drives, got none. Name it.")
         if drive is None:
@@ -118,13 +119,13 @@ def response_of(options: EstimateResponse) -> None:
 
 
 @contextmanager
-def _estimating(options: Estimation) -> Iterator[Terminal]:
+def _estimating(options: Estimation, spelling: Spelling) -> Iterator[Terminal]:
     """Refuse files that cannot be written, and begin the message of what has no answer with the name of its data."""
     refuse_places(options, [options.data], results_kind="estimates", source_file=options.data.name)
     try:
-        yield wide_terminal()
+        yield wide_terminal(spelling)
     except EstimationError as problem:
-        raise EstimationError(f"{options.data}: {problem}") from problem
+        raise problem.named(options.data) from problem
 
 
 def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
@@ -163,6 +164,7 @@ def _sourced(dataset: xr.Dataset, data: Path, recording: Recording) -> xr.Datase
 
 def _write(console: Terminal, dataset: xr.Dataset, options: Estimation) -> None:
     """Write what was asked for, and say so."""
+    dataset = dataset.assign_attrs(spelled(dataset.attrs, console.spelling))
     if options.output is not None:
         with writing(options.output):
             write_results(dataset, options.output, kind="estimates")

@@ -29,7 +29,7 @@ def show_sensitivity(options: Sensitivity) -> None:
                 seed=options.seed,
             )
         except (DatasetError, UsageError) as problem:
-            raise type(problem)(f"{file}: {problem}") from problem
+            raise problem.named(file) from problem
     found = found.assign_attrs(source=str(path))
     _print(wide_terminal(), found)
     write_found(found, "sensitivity", options)

@@ -19,19 +19,20 @@ from vibroimpact.analysis.spikes import Mechanics, SpikeReport, SpikeSettings, s
 from vibroimpact.analysis.spikes.printing import print_spikes
 from vibroimpact.analysis.spikes.report import unobserved
 from vibroimpact.fmus.errors import EstimationError, UsageError
+from vibroimpact.fmus.messages import Spelling, joined, spelled, typed
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 #: Fewer spikes have no statistics of intervals.
 _FEWEST_FOR_INTERVALS = 3
 
 
-def find_spikes(options: Spikes) -> None:
+def find_spikes(options: Spikes, spelling: Spelling = typed) -> None:
     """Find the spikes of a channel, or look at the intervals of an event train; print, write and draw them."""
     data, output, figure = options.data, options.output, options.figure
     settings, mechanics = _settings(options), _mechanics(options)
     refuse_places(options, [data], results_kind="spikes", source=data.name)
     recording = open_signals(data, options.run)
-    console = wide_terminal()
+    console = wide_terminal(spelling)
     for remark in recording.remarks_counted:
         console.print(remark, style="yellow")
     report = None
@@ -42,8 +43,8 @@ def find_spikes(options: Spikes) -> None:
         else:
             report, dataset = _spikes(console, recording, options, settings, mechanics)
     except EstimationError as problem:
-        raise EstimationError(f"{data}: {problem}") from problem
-    dataset = dataset.assign_attrs(source=data.name)
+        raise problem.named(data) from problem
+    dataset = dataset.assign_attrs(spelled(dataset.attrs, spelling), source=data.name)
     if output is not None:
         with writing(output):
             write_results(dataset, output, kind="spikes")
@@ -117,7 +118,7 @@ def _spikes(
     # what was observed begins with the first spike: before it, one may have been cut off
     train = EventTrain("spikes", dataset["spike_time"].values)
     more = _trains(console, train, options, unobserved(report))
-    remarks = "\n".join(each.attrs["remarks"] for each in (dataset, more) if each.attrs.get("remarks"))
+    remarks = joined("\n", (each.attrs["remarks"] for each in (dataset, more) if each.attrs.get("remarks")))
     merged = xr.merge([dataset, more], combine_attrs="drop_conflicts", join="outer", compat="override")
     return report, merged.assign_attrs(remarks=remarks)
 

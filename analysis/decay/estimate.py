@@ -9,6 +9,7 @@ import xarray as xr
 
 from vibroimpact.analysis.files.estimate_table import estimate_table
 from vibroimpact.analysis.recording.units import unit_label
+from vibroimpact.fmus.messages import message
 from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 
@@ -113,4 +114,4 @@ def _cells(estimate: Estimate) -> tuple[str, str, str, str]:
 def print_remarks(console: Terminal, remarks: tuple[str, ...]) -> None:
     """Print remarks, one line each."""
     for remark in remarks:
-        console.print(f"- {remark}", soft_wrap=True)
+        console.print(message("- ", remark), soft_wrap=True)

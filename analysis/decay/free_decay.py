@@ -29,6 +29,7 @@ from vibroimpact.analysis.decay.second_oscillation import SecondOscillation, sec
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
+from vibroimpact.fmus.messages import joined, message
 from vibroimpact.fmus.printing import table, value_and_error, with_error
 from vibroimpact.fmus.terminal import Terminal
 
@@ -117,7 +118,7 @@ class FreeDecay:
             said += self.choice.words()
         if self.backbone is not None:
             said.append(self.backbone.words(self.samples.unit))
-        said += [f"{method}: {reason}" for method, reason in self.refusals.items()]
+        said += [message(f"{method}: ", reason) for method, reason in self.refusals.items()]
         return tuple(said)
 
     def dataset(self) -> xr.Dataset:
@@ -135,7 +136,7 @@ class FreeDecay:
             reference_time=self.samples.reference_time,
             best_law="" if self.law is None else self.law.law.name,
             verdict=self.verdict,
-            remarks="\n".join(self.words()),
+            remarks=joined("\n", self.words()),
         )
 
 
@@ -172,7 +173,7 @@ def estimate_decay(
         try:
             return estimate()
         except EstimationError as problem:
-            refusals[method] = str(problem)
+            refusals[method] = problem.message
             return None
 
     decrement = tried("decrement", lambda: logarithmic_decrement(samples))

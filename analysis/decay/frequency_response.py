@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.decay.leakage import NO_LEAKAGE, Leakage, leakage_of
-from vibroimpact.analysis.decay.samples import Complexes, Floats, clock_remark, unit_power
+from vibroimpact.analysis.decay.samples import WIDEN, Complexes, Floats, clock_remark, unit_power
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 WINDOWS = ("bartlett", "hann", "boxcar")
 _SEGMENTS, _FEWEST_SEGMENTS = 8, 5
@@ -112,7 +112,9 @@ def frequency_response(
         Unknown window, uneven sampling, or too few samples.
     """
     if window not in WINDOWS:
-        raise UsageError(f'{option("window")}: expected one of {", ".join(WINDOWS)}, got "{window}".')
+        raise UsageError(
+            message(Argument("window"), f': expected one of {", ".join(WINDOWS)}, got "{window}".')
+        )
     drive, response = channel_of(drive), channel_of(response)
     x, y, interval, remarks = _pair(drive, response, start, stop)
     count = len(x)
@@ -120,7 +122,10 @@ def frequency_response(
     chosen = min(automatic if segment is None else segment, count)
     if chosen < _SHORTEST:
         raise UsageError(
-            f"{option('segment')}: expected {_SHORTEST} samples or more, got {chosen}. Take longer segments."
+            message(
+                Argument("segment"),
+                f": expected {_SHORTEST} samples or more, got {chosen}. Take longer segments.",
+            )
         )
     known = (
         drive.axis.trigger == response.axis.trigger,
@@ -235,8 +240,11 @@ def _pair(
     time = drive.time[(drive.time >= low) & (drive.time <= high)]
     if len(time) < 2 * _SHORTEST:
         raise UsageError(
-            f"{drive.name} and {response.name}: expected {2 * _SHORTEST} samples or more in common, got {len(time)}. "
-            f"Widen {option('start')} and {option('stop')}."
+            message(
+                f"{drive.name} and {response.name}: expected {2 * _SHORTEST} samples or more in common, got "
+                f"{len(time)}. ",
+                WIDEN,
+            )
         )
     signals = []
     for channel in (drive, response):

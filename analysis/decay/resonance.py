@@ -15,7 +15,7 @@ from vibroimpact.analysis.decay.leakage import NO_LEAKAGE, Leakage
 from vibroimpact.analysis.decay.residuals import coloured_covariance, residual_test
 from vibroimpact.analysis.decay.samples import Complexes, Floats
 from vibroimpact.fmus.errors import EstimationError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, joined, message
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
@@ -143,7 +143,9 @@ def curve_of(
         Unknown form, or too few lines in the band.
     """
     if form not in ("auto", *FORMS):
-        raise UsageError(f'{option("form")}: expected auto or one of {", ".join(FORMS)}, got "{form}".')
+        raise UsageError(
+            message(Argument("form"), f': expected auto or one of {", ".join(FORMS)}, got "{form}".')
+        )
     if form == "auto":
         form = _form_of(found.units)
     response = found.h2 if estimator == "h2" else found.h1
@@ -158,8 +160,11 @@ def curve_of(
         lines &= np.abs(omega - peak) <= _BAND * max(width, finest)
     if np.count_nonzero(lines) < _FEWEST_LINES:
         raise UsageError(
-            f"{option('band')}: expected {_FEWEST_LINES} lines or more, got {np.count_nonzero(lines)}; they are "
-            f"{found.frequency[1] - found.frequency[0]:.4g} Hz apart. Widen the band, or take longer segments."
+            message(
+                Argument("band"),
+                f": expected {_FEWEST_LINES} lines or more, got {np.count_nonzero(lines)}; they are "
+                f"{found.frequency[1] - found.frequency[0]:.4g} Hz apart. Widen the band, or take longer segments.",
+            )
         )
     magnitude = np.abs(response)
     known = found.averages > 1.5 and float(np.max(found.coherence[lines])) < 1.0 - _ROUNDING
@@ -405,8 +410,11 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
     if found.resolution < 0.25 * width:
         return ()
     return (
-        f"a line is {found.resolution:.3g} Hz wide and the resonance {width:.3g} Hz: the fit takes the leakage out, "
-        f"and its doubt widens the intervals. Take longer segments ({option('segment')}), or fit the decay.",
+        message(
+            f"a line is {found.resolution:.3g} Hz wide and the resonance {width:.3g} Hz: the fit takes the leakage "
+            "out, and its doubt widens the intervals. Take longer segments (",
+            *(Argument("segment"), "), or fit the decay."),
+        ),
     )
 
 
@@ -474,5 +482,5 @@ class ResponseEstimates:
             title=self.title,
             form=fit.form,
             verdict=fit.verdict,
-            remarks="\n".join(self.words()),
+            remarks=joined("\n", self.words()),
         )

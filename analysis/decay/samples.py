@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 FEWEST_SAMPLES = 16
 """Number of samples below which the five unknowns of a decaying cosine are not fitted."""
+WIDEN = message("Widen ", Argument("start"), " and ", Argument("stop"), ".")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +68,15 @@ def decay_samples(
     time, good = channel.time, channel.good
     if not np.any(good):
         raise UsageError(f"{channel.name}: expected good samples, got none: all are missing or clipped.")
-    remarks = []
+    remarks: list[str] = []
     if start is None:
         start = _largest_excursion(time[good], channel.values[good])
         if start > time[good][0]:
             remarks.append(
-                f"the decay is taken from the largest excursion, at {start:.6g} s; {option('start')} sets it."
+                message(
+                    f"the decay is taken from the largest excursion, at {start:.6g} s; ",
+                    *(Argument("start"), " sets it."),
+                )
             )
     remarks += clock_remark(channel)
     stop = float(time[-1]) if stop is None else stop
@@ -83,9 +87,11 @@ def decay_samples(
     chosen &= good
     if np.count_nonzero(chosen) < FEWEST_SAMPLES:
         raise UsageError(
-            f"{channel.name}: expected {FEWEST_SAMPLES} good samples or more from {start:g} to {stop:g} s, got "
-            f"{np.count_nonzero(chosen)}; the channel runs from {time[0]:g} to {time[-1]:g} s. "
-            f"Widen {option('start')} and {option('stop')}."
+            message(
+                f"{channel.name}: expected {FEWEST_SAMPLES} good samples or more from {start:g} to {stop:g} s, got "
+                f"{np.count_nonzero(chosen)}; the channel runs from {time[0]:g} to {time[-1]:g} s. ",
+                WIDEN,
+            )
         )
     return DecaySamples(
         time[chosen], channel.values[chosen], channel.unit, channel.name, float(start), tuple(remarks)

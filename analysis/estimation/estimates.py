@@ -12,6 +12,7 @@ from rich.table import Table
 
 from vibroimpact.analysis.estimation.physics import Floats
 from vibroimpact.analysis.files.estimate_table import described, estimate_table
+from vibroimpact.fmus.messages import joined, message
 from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
@@ -203,13 +204,14 @@ class ImpactEstimates:
         unsure = [name for name in answered if name not in sure]
         if not answered:
             why = ["no method has an answer", *(doubt.reason for doubt in self.doubts)]
-            return f"not sure, because {_listed(why)}."
+            return message("not sure, because ", _listed(why), ".")
         if not sure:
-            return f"not sure, because {_listed([doubt.reason for doubt in self.doubts])}."
+            return message("not sure, because ", _listed([doubt.reason for doubt in self.doubts]), ".")
         if not unsure:
             return f"sure of {_named(sure)}."
         why = [reason for name in unsure for reason in self.reasons(name)]
-        return f"sure of {_named(sure)}; not sure of {_named(unsure)}, because {_listed(why)}."
+        said = f"sure of {_named(sure)}; not sure of {_named(unsure)}, because "
+        return message(said, _listed(why), ".")
 
     def unit_of(self, quantity: str) -> str:
         """Return the unit of a quantity, the channel's filled in."""
@@ -271,10 +273,11 @@ class ImpactEstimates:
             "channel": self.channel,
             "confidence": self.confidence,
             "verdict": self.verdict,
-            "doubts": "\n".join(
-                f"{', '.join(doubt.methods) or 'all'}: {doubt.reason}" for doubt in self.doubts
+            "doubts": joined(
+                "\n",
+                (message(f"{', '.join(doubt.methods) or 'all'}: ", doubt.reason) for doubt in self.doubts),
             ),
-            "remarks": "\n".join(self.remarks),
+            "remarks": joined("\n", self.remarks),
             "refusals": "\n".join(f"{refusal.method}: {refusal.reason}" for refusal in self.refusals),
             **{f"conditioning_{name}": value for name, value in self.conditioning.items()},
             **self.facts,
@@ -285,7 +288,8 @@ def _listed(reasons: Sequence[str]) -> str:
     """Return the gravest reasons in one line."""
     different = list(dict.fromkeys(reasons))
     more = len(different) - _REASONS_IN_LINE
-    return "; ".join(different[:_REASONS_IN_LINE]) + (f"; and {more} more" if more > 0 else "")
+    shown = joined("; ", different[:_REASONS_IN_LINE])
+    return message(shown, f"; and {more} more") if more > 0 else shown
 
 
 def _named(methods: Sequence[str]) -> str:
@@ -305,11 +309,11 @@ def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
         console.print(f"{name.replace('_', ' ')}: {shown}")
     for doubt in estimates.doubts:
         of = f" of {', '.join(doubt.methods)}" if doubt.methods else ""
-        console.print(f"doubt{of}: {doubt.reason}")
+        console.print(message(f"doubt{of}: ", doubt.reason))
     for refusal in estimates.refusals:
         console.print(f"refused: {refusal.reason}")
     for remark in estimates.remarks:
-        console.print(f"note: {remark}")
+        console.print(message("note: ", remark))
 
 
 def _estimates(estimates: ImpactEstimates) -> Table:

@@ -19,7 +19,7 @@ from vibroimpact.analysis.estimation.model_tests import (
 )
 from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 # Standard errors from which evidence against the model counts: chance gets there once in a thousand times.
 _CLEAR = 3.3
@@ -37,6 +37,7 @@ _APART = 3.0
 # Relative standard error of a natural frequency, above which stiffness, force and offset fit alike along a valley. Of
 # the intervals in 300 records 72 to 82 % held the truth between .04 and .07, and 94 % below .03.
 _DETERMINED = 0.04
+_CLOCKS = message(", or clocks that differ (", Argument("clock_drifts"), ")")
 
 Values = Mapping[str, Mapping[str, MethodEstimate]]
 
@@ -123,7 +124,7 @@ def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
 
 def doubts_of(record: Prepared, values: Values, confidence: float) -> tuple[Doubt, ...]:
     """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
-    clocks = "" if record.forcing.clock_drifts else f", or clocks that differ ({option('clock_drifts')})"
+    clocks = "" if record.forcing.clock_drifts else _CLOCKS
     # without noise the residual is rounding, and standard errors of it say nothing
     noisy = record.fit.noise > _ROUNDING * record.signal.range
     return (
@@ -158,8 +159,11 @@ def _of_flights(record: Prepared, clocks: str) -> Iterator[Doubt]:
         yield Doubt(f"only {pairs} impacts have a usable flight on both sides: record more of them")
     if missed > max(1.0, _PART_UNEXPLAINED * (missed + used)):
         yield Doubt(
-            f"{missed} of {missed + record.left_out - missed + used} flights do not follow one oscillator with this "
-            f"force: a second mode, another force{clocks}"
+            message(
+                f"{missed} of {missed + record.left_out - missed + used} flights do not follow one oscillator with "
+                "this force: a second mode, another force",
+                clocks,
+            )
         )
     samples = float(np.median([len(flight.index) for flight in record.flights]))
     if samples < _FEWEST_SAMPLES:
@@ -188,8 +192,11 @@ def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
     excess = excess_of_trajectories(record)
     if excess > _CLEAR:
         yield Doubt(
-            f"trajectories through the impacts leave more than the flights between them, by {excess:.0f} standard "
-            f"errors: the restitution or the stop is not the same at all impacts{clocks}"
+            message(
+                f"trajectories through the impacts leave more than the flights between them, by {excess:.0f} standard "
+                "errors: the restitution or the stop is not the same at all impacts",
+                clocks,
+            )
         )
     if excess < -_CLEAR:
         yield Doubt(
@@ -202,8 +209,11 @@ def _of_constancy(record: Prepared, clocks: str) -> Iterator[Doubt]:
     """Yield trajectories that do not follow at all what single flights do."""
     if record.trajectory is not None and not record.trajectory.adequate:
         yield Doubt(
-            f"the fitted trajectories leave {record.trajectory.noise:.3g}, the single flights {record.fit.noise:.3g}: "
-            f"restitution or forcing is not constant{clocks}"
+            message(
+                f"the fitted trajectories leave {record.trajectory.noise:.3g}, the single flights "
+                f"{record.fit.noise:.3g}: restitution or forcing is not constant",
+                clocks,
+            )
         )
 
 

@@ -52,7 +52,7 @@ from vibroimpact.analysis.figures.sweep.measured_sweep import draw_measured_swee
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 Data = xr.Dataset | Recording
 Family = Literal[
@@ -255,7 +255,8 @@ def draw_view(data: Data, kind: str, view: View) -> Figure:
     except DatasetError as problem:
         if family != "runs" or KINDS[chosen].fits(data):
             raise
-        raise DatasetError(f"{problem} Kinds that fit: {', '.join(fitting(data)) or 'none'}.") from problem
+        fit = f" Kinds that fit: {', '.join(fitting(data)) or 'none'}."
+        raise DatasetError(message(problem.message, fit)) from problem
 
 
 def fitting(data: Data) -> list[str]:
@@ -336,11 +337,11 @@ def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
         takers = [taker for taker, one in KINDS.items() if name in one.takes and family in one.families]
         advice = "Leave it out."
         if name == "run" and family == "replay":
-            advice = f"Name a recording ({option('recording')}): {recordings_of(data)}."
+            advice = message("Name a recording (", Argument("recording"), f"): {recordings_of(data)}.")
         elif takers and not is_foreign:
             advice = f"It goes with {', '.join(takers)}."
         raise UsageError(
-            f"figure: {name}: expected none for {_WORDS[family]} drawn as {kind}, got one. {advice}"
+            message(f"figure: {name}: expected none for {_WORDS[family]} drawn as {kind}, got one. ", advice)
         )
 
 
@@ -365,5 +366,8 @@ def _refuse_run(dataset: Any, kind: str, run: int | None) -> None:
                 f"figure: kind: expected one that fits this dataset ({', '.join(fitting(dataset))}), got {kind!r}."
             )
         raise DatasetError(
-            f"figure: run: expected one run, got {there.size}. Name one by its run_index ({option('run')}): {listed}."
+            message(
+                f"figure: run: expected one run, got {there.size}. Name one by its run_index (",
+                *(Argument("run"), f"): {listed}."),
+            )
         )

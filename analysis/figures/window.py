@@ -10,12 +10,13 @@ import xarray as xr
 
 from vibroimpact.analysis.figures.page import Floats
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import Either, message, option_of
 
 #: Forcing periods drawn of a longer record; more would run together in one column.
 SHOWN_PERIODS = 8
 # Share of a period by which rounding may lengthen whole ones.
 _SLACK = 1e-6
+_FIRST, _LAST = (Either(name, option_of(name).removeprefix("--")) for name in ("start", "stop"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,19 +32,24 @@ class Window:
 
     def __post_init__(self) -> None:
         """Refuse what is no window."""
-        first, last = _names()
-        for name, value in ((first, self.start), (last, self.stop), ("periods", self.periods)):
+        for name, value in ((_FIRST, self.start), (_LAST, self.stop), ("periods", self.periods)):
             if value is not None and not math.isfinite(value):
-                raise UsageError(f"figure: {name}: expected a number, got {value}.")
+                raise UsageError(message("figure: ", name, f": expected a number, got {value}."))
         if self.periods is not None and self.periods <= 0.0:
             raise UsageError(f"figure: periods: expected a number > 0, got {self.periods:g}.")
         if None not in (self.start, self.stop, self.periods):
             raise UsageError(
-                f"figure: window: expected two of {first}, {last} and periods at most, got all three."
+                message(
+                    *("figure: window: expected two of ", _FIRST, ", ", _LAST),
+                    " and periods at most, got all three.",
+                )
             )
         if self.start is not None and self.stop is not None and self.start >= self.stop:
             raise UsageError(
-                f"figure: window: expected {first} < {last}, got {self.start:g} and {self.stop:g}. Turn them round."
+                message(
+                    *("figure: window: expected ", _FIRST, " < ", _LAST),
+                    f", got {self.start:g} and {self.stop:g}. Turn them round.",
+                )
             )
 
     @property
@@ -67,8 +73,11 @@ class Window:
         first, last = self.whole(time)
         if self.periods is not None and period is None:
             raise UsageError(
-                f"figure: periods: expected a scene with a forcing period, got none. "
-                f"Give a part of {first:.6g} to {last:.6g} s with {' and '.join(_names())}."
+                message(
+                    "figure: periods: expected a scene with a forcing period, got none. "
+                    f"Give a part of {first:.6g} to {last:.6g} s with ",
+                    *(_FIRST, " and ", _LAST, "."),
+                )
             )
         start, stop = self._ends(first, last, period)
         if int(((time >= start) & (time <= stop)).sum()) < 2 < len(time):
@@ -86,11 +95,6 @@ class Window:
         if self.periods is None:
             return start, last if self.stop is None else self.stop
         return (start, start + length) if self.stop is None else (self.stop - length, self.stop)
-
-
-def _names() -> tuple[str, str]:
-    """Return what the ends of a window are called by who gives them."""
-    return typed_or_called("from", "start"), typed_or_called("to", "stop")
 
 
 #: Nothing was asked for.

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.messages import lines_of
 
 RECORDING_SCHEMA = "1"
 
@@ -210,7 +211,8 @@ class Recording:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a reader must know, line by line."""
-        return tuple(line for line in str(self.attrs.get("remarks", "")).splitlines() if line)
+        found = self.attrs.get("remarks", "")
+        return tuple(line for line in lines_of(found if isinstance(found, str) else str(found)) if line)
 
     @property
     def remarks_counted(self) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ from vibroimpact.analysis.recording.channels import (
 from vibroimpact.analysis.recording.rules import EVENT_ENDING, QUALITY_ENDING, problems_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 MOST_VALUES = 10**8
 """Values of 8 bytes above which a recording is refused: some bytes of a damaged file can promise any number."""
@@ -300,7 +300,10 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
     if is_recording(path):
         if run is not None:
             raise DatasetError(
-                f"{os.fspath(path)}: {option('run')}: expected none of a recording, got {run}. Leave it out."
+                message(
+                    *(f"{os.fspath(path)}: ", Argument("run")),
+                    f": expected none of a recording, got {run}. Leave it out.",
+                )
             )
         return open_recording(path)
     try:
@@ -312,8 +315,11 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
         indices = flat.run_index.values.tolist()
         if run is None and len(indices) > 1:
             raise DatasetError(
-                f"{os.fspath(path)}: expected one run to be named, got {len(indices)} (run_index {indices[0]} to "
-                f"{indices[-1]}). Choose one with {option('run')}."
+                message(
+                    f"{os.fspath(path)}: expected one run to be named, got {len(indices)} (run_index {indices[0]} to "
+                    f"{indices[-1]}). Choose one with ",
+                    *(Argument("run"), "."),
+                )
             )
         if run is not None and run not in indices:
             raise DatasetError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibroimpact.analysis.recording.channels import Channel, EventTrain, Quality, Recording
+from vibroimpact.fmus.messages import message
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
@@ -24,7 +25,7 @@ def print_recording(console: Terminal, recording: Recording) -> None:
         shown = "overrange" if scalar.overrange else f"{scalar.value:.6g} {written_unit(scalar.unit)}"
         console.print(f"{name} = {shown}")
     for line in recording.remarks:
-        console.print(f"- {line}", soft_wrap=True)
+        console.print(message("- ", line), soft_wrap=True)
 
 
 def _channel_row(channel: Channel) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.robust import MAD_TO_SIGMA, robust_sigma
 from vibroimpact.analysis.spikes.baseline import running_median
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 Floats = NDArray[np.float64]
 
@@ -83,8 +83,11 @@ def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
     if period is not None:
         if not 2.0 <= period <= 0.5 * (len(values) - 1):
             raise UsageError(
-                f"period: expected two samples at least and half the record at most, got {period:g} samples of "
-                f"{len(values)}. Give another {option('period')}."
+                message(
+                    f"period: expected two samples at least and half the record at most, got {period:g} samples of "
+                    f"{len(values)}. Give another ",
+                    *(Argument("period"), "."),
+                )
             )
         return _folded(values, period, f"a period of {period:g} samples was asked for")
     first = _strongest_line(level)

@@ -30,11 +30,12 @@ from vibroimpact.analysis.spikes.noise import (
     tail_threshold,
 )
 from vibroimpact.fmus.errors import EstimationError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 Floats = NDArray[np.float64]
 
 METHODS = ("auto", "threshold", "cycle_median", "cycle_threshold")
+_THRESHOLD = Argument("method", "threshold")
 POLARITIES = {"both": 0, "positive": 1, "negative": -1}
 #: Windows of the RMS of a smooth shock in one cycle.
 _RMS_WINDOWS_IN_CYCLE = 10
@@ -292,8 +293,11 @@ def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[
     if interval is None:
         if settings.method.startswith("cycle"):
             raise EstimationError(
-                f"{channel.name}: {settings.method}: expected evenly spaced samples, got uneven ones. "
-                f"Resample it at import, or use {option('method', 'threshold')}."
+                message(
+                    f"{channel.name}: {settings.method}: expected evenly spaced samples, got uneven ones. "
+                    "Resample it at import, or use ",
+                    *(_THRESHOLD, "."),
+                )
             )
         cycle = PeriodicPart(0.0, np.zeros(len(signal)), 0, 1.0, "the samples are not evenly spaced")
     else:
@@ -304,8 +308,11 @@ def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[
         return cycle, "threshold", f"no periodic excitation: {cycle.reason}"
     if settings.method.startswith("cycle") and not cycle.found:
         raise EstimationError(
-            f"{channel.name}: {settings.method}: expected a periodic excitation, got none: {cycle.reason}. "
-            f"Give its period with {option('period')}, or use {option('method', 'threshold')}."
+            message(
+                f"{channel.name}: {settings.method}: expected a periodic excitation, got none: {cycle.reason}. "
+                "Give its period with ",
+                *(Argument("period"), ", or use ", _THRESHOLD, "."),
+            )
         )
     return cycle, settings.method, "asked for"
 
@@ -384,9 +391,11 @@ def _unrest(residual: Floats, interval: float) -> list[str]:
     if samples < HALF_WAVE_OF_MOTION:
         return []
     return [
-        f"Between its spikes the signal is no noise but a motion at about {0.5 / (samples * interval):.3g} Hz: "
-        "the threshold is what this motion hardly passes. "
-        f"Consider {option('method')}, {option('threshold')} and {option('baseline_window')}."
+        message(
+            f"Between its spikes the signal is no noise but a motion at about {0.5 / (samples * interval):.3g} Hz: "
+            "the threshold is what this motion hardly passes. Consider ",
+            *(Argument("method"), ", ", Argument("threshold"), " and ", Argument("baseline_window"), "."),
+        )
     ]
 
 

@@ -17,7 +17,7 @@ from vibroimpact.analysis.spikes.identify import Identification, SpikeSettings, 
 from vibroimpact.analysis.spikes.pulses import FOOT, Pulses, measure_pulses
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, joined, message
 
 Floats = NDArray[np.float64]
 
@@ -194,7 +194,9 @@ def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floa
     if known.restitution is None:
         if known.mass is not None:
             raise UsageError(
-                f"mass: expected a restitution with it, got none. Give {option('restitution')} too."
+                message(
+                    "mass: expected a restitution with it, got none. Give ", Argument("restitution"), " too."
+                )
             )
         return None
     if unit == "m s-2":
@@ -202,11 +204,15 @@ def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floa
     elif unit == "N":
         mass = known.mass
         if mass is None:
-            raise UsageError(f"restitution: expected a mass with it, got none. Give {option('mass')} too.")
+            raise UsageError(
+                message("restitution: expected a mass with it, got none. Give ", Argument("mass"), " too.")
+            )
     else:
         raise UsageError(
-            f"restitution: expected a force or an acceleration, got a channel in {unit}. "
-            f"Give {option('sensitivity')} for a load cell in volts."
+            message(
+                f"restitution: expected a force or an acceleration, got a channel in {unit}. Give ",
+                *(Argument("sensitivity"), " for a load cell in volts."),
+            )
         )
     return (
         impact_velocity(pulses.impulse, known.restitution, mass),
@@ -283,6 +289,6 @@ def _attributes(
         "sensitivity": known.sensitivity,
         "interval_uncertainty": channel.axis.interval_uncertainty,
         "verdict": found.verdict,
-        "remarks": "\n".join(found.remarks),
+        "remarks": joined("\n", found.remarks),
     }
     return {name: value for name, value in attributes.items() if value is not None}

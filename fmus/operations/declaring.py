@@ -126,9 +126,9 @@ class Operation:
     runs: ClassVar[str]
     door: ClassVar[Door | None]
 
-    def carry_out(self) -> None:
-        """Call the function that the operation names."""
-        pkgutil.resolve_name(f"{ROOT}.{self.runs}")(self)
+    def carry_out(self, **how: Any) -> None:
+        """Call the function that the operation names, with keywords of it that are no arguments of the operation."""
+        pkgutil.resolve_name(f"{ROOT}.{self.runs}")(self, **how)
 
     @classmethod
     def fields(cls) -> Iterator[Field]:

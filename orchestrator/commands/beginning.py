@@ -97,7 +97,7 @@ def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequ
         try:
             found = seed_of_run(runs, options.run)
         except (DatasetError, UsageError) as problem:
-            raise type(problem)(f"{options.from_dataset}: {problem}") from problem
+            raise problem.named(options.from_dataset) from problem
     if twice := sorted(found.values.keys() & {each.partition("=")[0].strip() for each in changes}):
         raise UsageError(f"--set {twice[0]}: expected another key than those the dataset sweeps, got one.")
     alone = scene.unswept([*varied, *found.values])

@@ -38,7 +38,7 @@ def show_energies(options: Energies) -> None:
         try:
             found = energies(dataset, options.run, progress=progress)
         except (DatasetError, UsageError) as problem:
-            raise type(problem)(f"{path}: {problem}") from problem
+            raise problem.named(path) from problem
     found = found.assign_attrs(scene_file=str(path))
     if "orbit" in found.attrs:
         _print_one(found)

@@ -30,7 +30,7 @@ def show_exponents(options: Lyapunov) -> None:
         try:
             found = lyapunov(dataset)
         except DatasetError as problem:
-            raise DatasetError(f"{path}: {problem}") from problem
+            raise problem.named(path) from problem
     reasons = [str(text) for text in found.reason.values.ravel() if str(text) != "no run"]
     counted = _counted([text for text in reasons if text])
     if all(reasons):

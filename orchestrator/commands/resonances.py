@@ -26,7 +26,7 @@ def show_resonances(options: Resonances) -> None:
         try:
             found = resonances(dataset)
         except (DatasetError, UsageError) as problem:
-            raise type(problem)(f"{path}: {problem}") from problem
+            raise problem.named(path) from problem
     found = found.assign_attrs(scene_file=str(path))
     unit = "" if found.attrs.get("units_system") == "nondimensional" else ", rad/s"
     headings = (

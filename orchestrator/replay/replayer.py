@@ -312,8 +312,9 @@ def opened_replay(scene: Scene, path: Path, execution: str) -> Replayer:
     try:
         return Replayer(scene, open_signals(path), execution=execution)
     except DatasetError as problem:
-        text = str(problem)
-        raise DatasetError(text if text.startswith(str(path)) else f"{path}: {text}") from problem
+        if str(problem).startswith(str(path)):
+            raise
+        raise problem.named(path) from problem
 
 
 def _cut(times: Floats, start: float | None, stop: float | None) -> Floats:

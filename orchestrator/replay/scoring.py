@@ -36,7 +36,7 @@ def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
             _compared(replayer, reading, motion, place) for place, reading in enumerate(replayer.readings)
         ]
     except EstimationError as problem:
-        raise EstimationError(f"{replayer.recording.title}: {problem}") from problem
+        raise problem.named(replayer.recording.title) from problem
 
 
 def _compared(replayer: Replayer, reading: ChannelReading, motion: Motion, place: int) -> Comparison:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.operations import Operation
@@ -20,7 +20,7 @@ class ServiceOperation(Operation):
 
     needs: ClassVar[tuple[str, ...]] = ("httpx",)
 
-    def carry_out(self) -> None:
+    def carry_out(self, **how: Any) -> None:
         """Call the function that the operation names, once the packages are there.
 
         Raises
@@ -34,4 +34,4 @@ class ServiceOperation(Operation):
                 f"expected the packages of the service, got none of {', '.join(missing)}. "
                 "Install them: pip install 'vibroimpact[service]'."
             )
-        super().carry_out()
+        super().carry_out(**how)

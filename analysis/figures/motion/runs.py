@@ -34,7 +34,7 @@ from vibroimpact.analysis.figures.page import (
 from vibroimpact.analysis.figures.scene_text import ShownStop, observed_stops, stops
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 #: More impacts than this have small marks.
 _MOST_LARGE_MARKS = 100
@@ -128,8 +128,11 @@ def _draw_periods(dataset: xr.Dataset, run: int | None) -> Figure:
     chosen = runs if run is None else runs.isel(run=runs["run_index"].values == run)
     if chosen.sizes["run"] != 1:
         raise DatasetError(
-            f"figure: expected one run, got {chosen.sizes['run']}. "
-            f"Name one of {runs.sizes['run']} by its run_index ({option('run')})."
+            message(
+                f"figure: expected one run, got {chosen.sizes['run']}. "
+                f"Name one of {runs.sizes['run']} by its run_index (",
+                *(Argument("run"), ")."),
+            )
         )
     one = chosen.isel(run=0)
     panels: dict[str, Callable[[Axes], None]] = {

@@ -17,7 +17,7 @@ from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 # Relative difference of runs on one orbit: rounding, and what is left of their transients.
 _NOISE = 1e-9
@@ -167,8 +167,10 @@ def refuse_variable(dataset: xr.Dataset, variable: str, whose: str) -> None:
     known = drawable_variables(dataset)
     if variable not in known:
         raise DatasetError(
-            f"figure: {option('variable')}: expected one that {whose} recorded "
-            f"({', '.join(known) or 'none is there'}), got {variable!r}."
+            message(
+                *("figure: ", Argument("variable")),
+                f": expected one that {whose} recorded ({', '.join(known) or 'none is there'}), got {variable!r}.",
+            )
         )
 
 

@@ -63,7 +63,7 @@ def test_an_error_that_gets_the_name_of_its_file_stays_what_it_is() -> None:
 
 
 def test_a_terminal_shows_the_spelling_that_it_is_for() -> None:
-    for spelled, shown in ((typed, "- Widen --from and --to."), (str, "- Widen start and stop.")):
+    for spelling, shown in ((typed, "- Widen --from and --to."), (str, "- Widen start and stop.")):
         file = io.StringIO()
-        Terminal(spelled, file=file).print(message("- ", WIDEN), soft_wrap=True)
+        Terminal(spelling, file=file).print(message("- ", WIDEN), soft_wrap=True)
         assert file.getvalue() == f"{shown}\n"

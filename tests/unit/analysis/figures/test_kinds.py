@@ -23,7 +23,6 @@ from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.fmus.wording import command_line
 
 
 def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
@@ -270,11 +269,10 @@ def plotted(*arguments: str) -> str:
     app = typer.Typer()
     app.callback()(lambda: None)
     commands.register(app)
-    with command_line():
-        done = CliRunner().invoke(app, ["plot", *arguments])
+    done = CliRunner().invoke(app, ["plot", *arguments])
     if done.exception is not None:
         assert isinstance(done.exception, DatasetError | UsageError), done.exception
-        return str(done.exception)
+        return done.exception.typed
     return done.output
 
 
