@@ -6,8 +6,7 @@ Who makes a message does not know who reads it. So a message has both spellings,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 _OPTIONS = {"baseline_window": "baseline", "start": "from", "stop": "to"}
 """Options that have another name than the argument."""
@@ -22,8 +21,7 @@ def option_of(argument: str) -> str:
     return f"--{_OPTIONS.get(argument, argument).replace('_', '-')}"
 
 
-@dataclass(frozen=True, slots=True)
-class Either:
+class Either(NamedTuple):
     """Words that differ where no argument is named."""
 
     called: str
@@ -36,8 +34,7 @@ WITH_OUTPUT = Either("", " with -o")
 """How another file or folder is chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class Argument:
+class Argument(NamedTuple):
     """An argument of an operation, or a value for it, as a message names it.
 
     >>> Argument("start").called, Argument("method", "threshold").called, Argument("events", False).called
@@ -122,7 +119,7 @@ def lines_of(text: str) -> list[str]:
     """
     if not isinstance(text, Message):
         return text.splitlines()
-    return [Message(*line) for line in zip(text.splitlines(), text.typed.splitlines(), strict=True)]
+    return [Message(*line) for line in zip(text.split("\n"), text.typed.split("\n"), strict=True)]
 
 
 def spelled(attributes: Mapping[str, Any], spelling: Spelling) -> dict[str, Any]:

@@ -26,5 +26,5 @@ def drawn(path: Path, file_format: str, kind: str = "auto", run: int | None = No
         with READING, opened_file(path) as found:
             figures.draw(found, kind, run).savefig(buffer, format=file_format)
     except VibroimpactError as error:
-        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None
+        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, error.typed) from None
     return buffer.getvalue()

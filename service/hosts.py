@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 
 LOCAL = "localhost"
 _NAME = re.compile(r"[a-z0-9]([a-z0-9\-_.]{0,252}[a-z0-9])?")
@@ -43,7 +43,10 @@ class Hosts:
         for name, said in zip(given, names, strict=True):
             if not _NAME.fullmatch(name) and _address(name) is None:
                 raise UsageError(
-                    f"{option('allow-host')}: expected a name such as lab.example, without port, got {said!r}."
+                    message(
+                        Argument("allow_host"),
+                        f": expected a name such as lab.example, without port, got {said!r}.",
+                    )
                 )
         self._names = sorted({*given, LOCAL, *([] if _is_any(address) else [address.lower()])})
 

@@ -15,10 +15,10 @@ import uvicorn
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.packaging.unpacked_cache import hold_at_most
 from vibroimpact.fmus.surroundings import refuse_no_loopback
 from vibroimpact.fmus.terminal import say
-from vibroimpact.fmus.wording import option
 from vibroimpact.service.api import application
 from vibroimpact.service.connections import Connections, limited, most_connections
 from vibroimpact.service.fmus import FmuStore
@@ -33,6 +33,7 @@ from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import DATABASE, LOG, Store
 from vibroimpact.service.supervisor import Supervisor
 
+_HOST = Argument("host")
 FMUS_HELD = 8
 """Unpacked FMUs that the service itself keeps from being swept: it reads their descriptions, its jobs run them."""
 BACKLOG = 128
@@ -147,12 +148,15 @@ def _refuse_remote(host: str, allow_remote: bool) -> None:
     try:
         address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
     except ValueError:
-        raise UsageError(f"{option('host')}: expected an address such as 127.0.0.1, got {host!r}.") from None
+        raise UsageError(message(_HOST, f": expected an address such as 127.0.0.1, got {host!r}.")) from None
     if not address.is_loopback and not allow_remote:
         raise UsageError(
-            f"{option('host')}: expected an address of this machine alone, got {host}. With {option('allow-remote')} "
-            "whoever reaches it can try tokens and, with the right one, run simulations here; what is sent is not "
-            "encrypted: put a proxy with TLS in front of it."
+            message(
+                *(_HOST, f": expected an address of this machine alone, got {host}. With "),
+                Argument("allow_remote"),
+                " whoever reaches it can try tokens and, with the right one, run simulations here; what is sent is not "
+                "encrypted: put a proxy with TLS in front of it.",
+            )
         )
 
 
@@ -167,6 +171,9 @@ def _bound(host: str, port: int) -> socket.socket:
     except OSError as error:
         listening.close()
         raise UsageError(
-            f"{option('port')}: expected a free port, got {port}: {error.strerror or error}. Choose another."
+            message(
+                Argument("port"),
+                f": expected a free port, got {port}: {error.strerror or error}. Choose another.",
+            )
         ) from None
     return listening

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.recording import write_recording
 from vibroimpact.analysis.recording.table import print_recording
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import spelled, typed
 from vibroimpact.fmus.terminal import wide_terminal
 from vibroimpact.hardware.operations.import_files import ImportFiles
 from vibroimpact.hardware.recordings import ImportSettings, import_recording, read_settings
@@ -19,6 +22,7 @@ def import_into(options: ImportFiles) -> None:
     common = None if options.settings is None else read_settings(options.settings)
     refuse_outputs(options.files, output, figure)
     recording = import_recording(options.files, given, common)
+    recording = replace(recording, attrs=spelled(recording.attrs, typed))
     sources = recording.attrs.get("source_sha256")
     refuse_overwriting(output, options.force, lambda there: there.get("source_sha256", "") == sources)
     with writing(output):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vibroimpact.fmus.messages import Message, typed
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 
 _PLAIN = ("label", "unit", "interval", "start", "group", "dated", "doubt")
@@ -54,7 +55,7 @@ def packed(raw: RawFile) -> tuple[dict[str, Any], list[Any]]:
     ]
     facts = {
         "source_format": raw.source_format,
-        "remarks": list(raw.remarks),
+        "remarks": [[line, typed(line)] for line in raw.remarks],
         "attrs": {key: _plain(value) for key, value in raw.attrs.items()},
         "damage": raw.damage,
         "tables": tables,
@@ -87,7 +88,7 @@ def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> RawFile:
         )
         for known in facts["tables"]
     ]
-    remarks = [str(line) for line in facts["remarks"]]
+    remarks = [Message(str(called), str(typed)) for called, typed in facts["remarks"]]
     return RawFile(str(facts["source_format"]), tables, remarks, dict(facts["attrs"]), str(facts["damage"]))
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.messages import message
 from vibroimpact.hardware.formats.cells import is_marker, is_number, read_cells, split_line
 from vibroimpact.hardware.formats.clock_columns import with_time
 from vibroimpact.hardware.formats.cut_off import without_cut_cells
@@ -63,7 +64,7 @@ def read_labview(content: str) -> RawFile:
         own = "" if begins is not None and not late else title
         found, more = _tables(replace(segment, rows=rows), header, separator, decimal, late, own)
         tables += found
-        remarks += [f"{title}: {line}" if title else line for line in (*more, *cut)]
+        remarks += [message(f"{title}: ", line) if title else line for line in (*more, *cut)]
     if not tables:
         raise DatasetError(
             "expected rows of numbers after the header, got none. The measurement holds no data."

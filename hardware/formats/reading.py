@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vibroimpact.fmus import wording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.reader_process import Answer, Order, read_apart
 from vibroimpact.hardware.formats import arrow, hdf5, labview, uff, wav
@@ -84,7 +83,7 @@ def _read_apart(
     order = Order(
         reader,
         os.path.abspath(path),
-        {"typed": bool(wording.typed_or_called("typed")), "reading": options},
+        options,
         seconds,
         MEMORY + PER_BYTE * size,
         _MOST_BYTES,

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from vibroimpact.analysis.recording.units import measured_unit
-from vibroimpact.fmus import wording
 from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.crossing import packed, packed_datasets
 from vibroimpact.hardware.formats.uff import read_datasets as datasets_of
@@ -16,11 +14,10 @@ measured_unit("g")  # loads the units once: this module is imported before a pro
 
 
 def read(path: str, options: dict[str, Any]) -> tuple[dict[str, Any], list[Any]]:
-    """Return what a file holds, for another process; messages name options where a command was typed there."""
-    with wording.command_line() if options["typed"] else nullcontext():
-        return packed(read_raw(Path(path), **options["reading"]))
+    """Return what a file holds, for another process."""
+    return packed(read_raw(Path(path), **options))
 
 
 def read_datasets(path: str, options: dict[str, Any]) -> tuple[dict[str, Any], list[Any]]:
     """Return the datasets of a universal file, for another process."""
-    return packed_datasets(*datasets_of(path, frozenset(options["reading"]["wanted"])))
+    return packed_datasets(*datasets_of(path, frozenset(options["wanted"])))

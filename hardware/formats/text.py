@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.hardware.formats.cells import (
     column_of,
     has_thousands,
@@ -193,14 +193,20 @@ def _tables(columns: Sequence[Column]) -> list[Table]:
 
 def _remarks_on(tables: Sequence[Table]) -> list[str]:
     """Say which columns are taken as instants where no heading says so."""
-    remarks = []
+    remarks: list[str] = []
     if tables[0].time is not None and tables[0].time.label == FIRST_WITHOUT_HEADING:
         remarks.append(
-            f"the first column has no heading and ascends: it is taken as the instants ({option('time_column')})"
+            message(
+                "the first column has no heading and ascends: it is taken as the instants (",
+                *(Argument("time_column"), ")"),
+            )
         )
     if len(tables) > 1:
         remarks.append(
-            f"{len(tables)} columns have instants, each for those that follow it ({option('time_column')})"
+            message(
+                f"{len(tables)} columns have instants, each for those that follow it (",
+                *(Argument("time_column"), ")"),
+            )
         )
     return remarks
 
@@ -234,15 +240,20 @@ def _dialect_of(tried: Sequence[str], delimiter: str | None, decimal: str) -> tu
             best, width = lax, more
     if best is None:
         raise DatasetError(
-            "expected rows of numbers, got none. Is it text? "
-            f"Give {option('delimiter')} and {option('decimal')} if it is."
+            message(
+                "expected rows of numbers, got none. Is it text? Give ",
+                *(Argument("delimiter"), " and ", Argument("decimal"), " if it is."),
+            )
         )
     doubtful = (best.delimiter, best.decimal, width) == (",", ".", 2) and not any(
         "." in line for line in tried
     )
     if doubtful and not decimal and not delimiter:
         return best, [
-            f"one comma in each row is read as between two columns; if it is decimal, {option('decimal', ',')}"
+            message(
+                "one comma in each row is read as between two columns; if it is decimal, ",
+                Argument("decimal", ","),
+            )
         ]
     return best, []
 
@@ -251,9 +262,11 @@ def _grouped(rows: Sequence[str], dialect: Dialect) -> list[str]:
     """Say where points are separators of thousands, since commas are decimal."""
     if dialect.decimal != ",":
         return []
-    remarks = []
+    remarks: list[str] = []
     if dialect.delimiter == ",":
-        remarks.append(f"commas between quotes are decimal signs ({option('decimal', '.')} if not)")
+        remarks.append(
+            message("commas between quotes are decimal signs (", Argument("decimal", "."), " if not)")
+        )
     found = next((match for row in rows if "." in row and (match := _GROUP.search(row))), None)
     if found is not None:
         remarks.append(
@@ -383,13 +396,9 @@ def _all_headings(
     labels, units = headings(header, narrow, delimiter)
     several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
     verb = "have" if width > narrow + 1 else "has"
-    remarks = (
-        [f"{several} in row {begun} of the table, and {verb} no heading ({option('name')})"]
-        if any(labels)
-        else []
-    )
+    said = message(f"{several} in row {begun} of the table, and {verb} no heading (", Argument("name"), ")")
     more = [""] * (width - narrow)
-    return labels + more, units + more, remarks
+    return labels + more, units + more, [said] if any(labels) else []
 
 
 def _uncommented(line: str) -> str:
@@ -441,9 +450,11 @@ def columns_of(
             row, text = column.strange[0]
             if len(column.strange) > max(3, _MOST_STRANGE * len(column.values)):
                 raise DatasetError(
-                    f"{name}: expected numbers, got {len(column.strange)} other cells, the first {text!r} in row "
-                    f"{row + 1}. Is the delimiter or the decimal sign another one "
-                    f"({option('delimiter')}, {option('decimal')})?"
+                    message(
+                        f"{name}: expected numbers, got {len(column.strange)} other cells, the first {text!r} in row "
+                        f"{row + 1}. Is the delimiter or the decimal sign another one (",
+                        *(Argument("delimiter"), ", ", Argument("decimal"), ")?"),
+                    )
                 )
             remarks.append(
                 f"{name}: {len(column.strange)} cells are no numbers and count as missing, the first is "

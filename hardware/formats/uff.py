@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, joined, message, reworded
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import seconds_in
 from vibroimpact.hardware.formats.probe import missing_extra, one_refusal
@@ -116,7 +116,10 @@ def _sorted_out(
     in_si = not units or units.get("units_code") == 1
     if not in_si:
         remarks.append(
-            f"the units of the file are {units.get('units_description', '')!r}, not SI ({option('unit')})"
+            message(
+                f"the units of the file are {units.get('units_description', '')!r}, not SI (",
+                *(Argument("unit"), ")"),
+            )
         )
     repeated = Counter(text_of(found.get("id1")) for found in functions)
     by_instants: dict[bytes, Table] = {}
@@ -143,11 +146,14 @@ def _sorted_out(
     if not tables:
         kinds = ", ".join(str(kind) for kind in sorted(types)) or "none"
         lost = f" Besides, {_CUT_OFF}." if cut else ""
-        what = "; ".join(line.split(";")[0] for line in remarks)[:300]
+        what = joined("; ", (reworded(line, lambda text: text.split(";")[0]) for line in remarks))
         raise DatasetError(
-            "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type "
-            f"{kinds}{f' ({what})' if what else ''}. In Python, hardware.formats.universal.read_universal reads "
-            f"frequency responses, spectra, shapes and geometry.{lost}"
+            message(
+                "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type ",
+                *(kinds, *((" (", reworded(what, lambda text: text[:300]), ")") if what else ())),
+                ". In Python, hardware.formats.universal.read_universal reads frequency responses, spectra, shapes "
+                f"and geometry.{lost}",
+            )
         )
     return RawFile("universal file (UFF 58)", tables, remarks)
 

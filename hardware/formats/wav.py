@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.probe import one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
@@ -52,7 +52,10 @@ def read_wav(content: bytes) -> RawFile:
     remarks = [f"scipy says: {line[:120]}" for line in heard]
     if table.dtype.kind != "f":
         remarks.append(
-            f"the samples are parts of full scale, which is 1 ({option('scale')}, {option('unit')})"
+            message(
+                "the samples are parts of full scale, which is 1 (",
+                *(Argument("scale"), ", ", Argument("unit"), ")"),
+            )
         )
     kind = f"{data.bits} bit{' float' if table.dtype.kind == 'f' else ''}"
     columns = [

@@ -12,6 +12,7 @@ from vibroimpact.analysis.recording import Channel, EventTrain, Recording
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.spikes.pulses import FOOT
 from vibroimpact.analysis.spikes.report import impulse_unit
+from vibroimpact.fmus.messages import joined
 from vibroimpact.hardware.rig.acquisition import Block, Gap
 from vibroimpact.hardware.rig.measurement import Measurement, PulseRule, rows_of
 
@@ -204,7 +205,7 @@ def with_pulses(
         f"{many} kept of {watched / rate:.6g} s, with {rule.before} samples before and {rule.after} after; "
         "what did not pass the threshold is not there"
     )
-    attrs = {**recording.attrs, "remarks": "\n".join([*recording.remarks, remark])}
+    attrs = {**recording.attrs, "remarks": joined("\n", [*recording.remarks, remark])}
     return replace(recording, events={TRAIN: train}, attrs=attrs)
 
 

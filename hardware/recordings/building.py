@@ -12,7 +12,7 @@ import numpy as np
 from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message, reworded
 from vibroimpact.hardware.formats.labels import is_known_unit, meant_unit, seconds_in
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Table
 from vibroimpact.hardware.recordings.channel_of import channel_of
@@ -23,6 +23,7 @@ from vibroimpact.hardware.recordings.sources import Source, naming, shortened
 from vibroimpact.hardware.recordings.time_axis import Placement, place
 
 _NUMBERED = re.compile(r"column_\d+")
+_NO_EVENTS = Argument("events", False)
 
 
 @dataclass(slots=True)
@@ -65,7 +66,9 @@ class Parts:
     def remark(self, lines: Sequence[str], title: str = "") -> None:
         """Add what was noticed, each line once."""
         for line in lines:
-            self.remarks.setdefault(shortened(f"{title}: {line}" if title else line))
+            self.remarks.setdefault(
+                reworded(line, lambda text: shortened(f"{title}: {text}" if title else text))
+            )
 
     def _add_column(
         self,
@@ -89,7 +92,10 @@ class Parts:
             self.events[name], more = event_train(name, instants, settings.window, settings.masked)
             if settings.events is None:
                 remarks.append(
-                    f"{name}: ascends unevenly, so it is taken as instants of events ({option('events', False)} if not)"
+                    message(
+                        f"{name}: ascends unevenly, so it is taken as instants of events (",
+                        *(_NO_EVENTS, " if not)"),
+                    )
                 )
             return remarks + more
         if len(column.values) == 1:
@@ -110,8 +116,10 @@ class Parts:
             self.events[name] = train
             return [
                 *remarks,
-                "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 "
-                f"({option('events', False)} if not)",
+                message(
+                    "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 (",
+                    *(_NO_EVENTS, " if not)"),
+                ),
             ]
         self.channels[name], more = channel_of(name, changed, placements[key], settings.masked)
         return remarks + more
@@ -141,10 +149,13 @@ def _described(name: str, column: Column, settings: ImportSettings, number: int)
     if unit is None:
         unit, said = meant_unit(column.label, column.unit)
     if said:
-        remarks.append(f"{name}: {said} ({option('unit')} if not)")
+        remarks.append(message(f"{name}: {said} (", Argument("unit"), " if not)"))
     if not is_known_unit(unit):
         remarks.append(
-            f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number ({option('unit')})"
+            message(
+                f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number (",
+                *(Argument("unit"), ")"),
+            )
         )
         unit = "1"
     attrs = dict(column.attrs)

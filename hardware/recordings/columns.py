@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.hardware.formats.labels import seconds_in
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 from vibroimpact.hardware.recordings.settings import ImportSettings
@@ -43,8 +43,11 @@ def _beyond_doubt(table: Table, settings: ImportSettings) -> Table:
     if settings.rate is not None:
         return replace(table, time=None)
     raise DatasetError(
-        f"column of instants, {table.time.label!r}: expected dates that can be read in one way, got others: "
-        f"{table.time.doubt}. Give {option('dates', 'day-first')} or {option('dates', 'month-first')}."
+        message(
+            f"column of instants, {table.time.label!r}: expected dates that can be read in one way, got others: "
+            f"{table.time.doubt}. Give ",
+            *(Argument("dates", "day-first"), " or ", Argument("dates", "month-first"), "."),
+        )
     )
 
 

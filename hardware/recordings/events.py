@@ -8,7 +8,7 @@ import numpy as np
 
 from vibroimpact.analysis.recording import EventTrain
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in
 from vibroimpact.hardware.formats.table import Column, Floats, Table
 from vibroimpact.hardware.recordings.printed_grid import common_step, decimal_step
@@ -119,8 +119,10 @@ def event_train(
         remarks.append(f"{name}: {len(masked)} parts of the observation are masked")
     if window is None:
         remarks.append(
-            f"{name}: when the observation began and ended is not known ({option('window')}); "
-            f"the first and the last event are at {times[0]:.6g} and {times[-1]:.6g} s"
+            message(
+                *(f"{name}: when the observation began and ended is not known (", Argument("window")),
+                f"); the first and the last event are at {times[0]:.6g} and {times[-1]:.6g} s",
+            )
         )
     return EventTrain(name, times, window, resolution, column.label, attrs), remarks
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from vibroimpact.analysis.recording import Recording, open_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, joined, message, reworded
 from vibroimpact.hardware.formats.choosing import check_file, holds_recording
 from vibroimpact.hardware.recordings.building import Parts
 from vibroimpact.hardware.recordings.gaps import AGREEMENT
@@ -66,9 +66,12 @@ def import_recording(
         parts.add(source, title=source.path.name if len(sources) > 1 else "")
     if not parts.channels and not parts.events:
         left_out = [line for line in parts.remarks if "left out" in line]
-        besides = f" Besides, {'; '.join(left_out[:3])}." if left_out else ""
+        besides = (" Besides, ", joined("; ", left_out[:3]), ".") if left_out else ()
         raise DatasetError(
-            f"{paths[0]}: expected channels of two samples or more, or instants of events, got none.{besides}"
+            message(
+                f"{paths[0]}: expected channels of two samples or more, or instants of events, got none.",
+                *besides,
+            )
         )
     parts.remark(_of_the_whole(parts))
     return Recording(parts.channels, parts.events, parts.scalars, _provenance(sources, parts))
@@ -88,10 +91,11 @@ def _passed_on(files: Sequence[Path], given: ImportSettings) -> Recording:
 
 def _of_the_whole(parts: Parts) -> list[str]:
     """Return remarks on all channels together."""
-    remarks = []
+    remarks: list[str] = []
     plain = [name for name, channel in parts.channels.items() if channel.unit == "1"]
     if plain:
-        remarks.append(f"no unit is known for {', '.join(plain)}: pure numbers ({option('unit')})")
+        known = f"no unit is known for {', '.join(plain)}: pure numbers ("
+        remarks.append(message(known, Argument("unit"), ")"))
     axes = {id(channel.axis): channel.axis for channel in parts.channels.values()}.values()
     triggers = list(dict.fromkeys(axis.trigger for axis in axes))
     if len(triggers) > 1:
@@ -118,8 +122,12 @@ def _provenance(sources: Sequence[Source], parts: Parts) -> dict[str, Any]:
         "source_format": ", ".join(dict.fromkeys(source.raw.source_format for source in sources)),
         "import_settings": json.dumps(settings, sort_keys=True),
         **attrs,
-        "remarks": "\n".join(" ".join(line.split()) for line in parts.remarks),
+        "remarks": joined("\n", (reworded(line, _on_one_line) for line in parts.remarks)),
     }
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _hash(path: Path) -> str:

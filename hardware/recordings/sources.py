@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.messages import message, reworded
 from vibroimpact.hardware.formats.reading import read_file
 from vibroimpact.hardware.formats.table import RawFile
 from vibroimpact.hardware.formats.text import DELIMITERS
@@ -93,8 +94,12 @@ def naming(path: Path, besides: str = "") -> Iterator[None]:
     try:
         yield
     except DatasetError as problem:
-        lines = f"{problem}{f' Besides, {besides}.' if besides else ''}".splitlines()
-        raise DatasetError("\n".join(f"{path}: {line}" for line in map(shortened, lines))) from problem
+
+        def named(text: str) -> str:
+            return "\n".join(f"{path}: {line}" for line in map(shortened, text.splitlines()))
+
+        more = f" Besides, {besides}." if besides else ""
+        raise DatasetError(reworded(message(problem.message, more), named)) from problem
     except OSError as problem:
         raise DatasetError(
             f"{path}: expected a readable file, got an error: {problem.strerror or problem}."

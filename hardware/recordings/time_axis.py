@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Flags, Floats, Table
 from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in, pace_of
 from vibroimpact.hardware.recordings.printed_grid import digits_of
@@ -99,8 +99,11 @@ def _placed(table: Table, column: Column, rate: float | None) -> Placement:
         late = f"{column.label}: by the header it begins at {column.start:.6g} s ({length} samples)"
         return _even(column.start, column.interval, length, source, [late] if column.group else [])
     raise DatasetError(
-        f"{column.label}: expected a column of instants or a sampling interval, got neither. "
-        f"Give {option('rate')} (samples per second), or {option('time_column')}. {_columns_tried(table)}"
+        message(
+            f"{column.label}: expected a column of instants or a sampling interval, got neither. Give ",
+            *(Argument("rate"), " (samples per second), or ", Argument("time_column"), ". "),
+            _columns_tried(table),
+        )
     )
 
 
@@ -109,9 +112,10 @@ def _columns_tried(table: Table) -> str:
     for number, column in enumerate(table.columns, 1):
         values = column.values[np.isfinite(column.values)]
         if len(values) > 1 and bool(np.all(np.diff(values) > 0.0)):
-            return (
+            return message(
                 f"Tried: column {number}, {column.label[:40]!r}, ascends from {values[0]:.6g} to {values[-1]:.6g}, but "
-                f"its heading names no time; {option('time_column', str(number))} takes it as s."
+                "its heading names no time; ",
+                *(Argument("time_column", str(number)), " takes it as s."),
             )
     names = ", ".join(repr(column.label[:40]) for column in table.columns[:5])
     return f"Tried: {names}: no heading names a time, and no column ascends."
@@ -329,7 +333,10 @@ def _in_order(instants: Floats, title: str) -> tuple[NDArray[np.intp], Flags, li
         remarks.append(f"{len(instants) - len(known)} rows without an instant are left out")
     if not len(known):
         raise DatasetError(
-            f"{title}: expected numbers, got none. Give {option('rate')}, or another {option('time_column')}."
+            message(
+                f"{title}: expected numbers, got none. Give ",
+                *(Argument("rate"), ", or another ", Argument("time_column"), "."),
+            )
         )
     order = known[np.argsort(instants[known], kind="stable")]
     back = int(np.sum(np.diff(instants[known]) < 0.0))
@@ -337,8 +344,11 @@ def _in_order(instants: Floats, title: str) -> tuple[NDArray[np.intp], Flags, li
     again = np.append(False, np.diff(instants[order]) == 0.0)
     if back + int(again.sum()) > _MOST_DOUBTFUL * len(known):
         raise DatasetError(
-            f"{title}: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
-            f"in {len(known)} rows. Give {option('rate')}, or name another {option('time_column')}."
+            message(
+                f"{title}: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
+                f"in {len(known)} rows. Give ",
+                *(Argument("rate"), ", or name another ", Argument("time_column"), "."),
+            )
         )
     if back:
         remarks.append(

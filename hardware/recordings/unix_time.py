@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.wording import option
+from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.hardware.formats.table import Column, Table
 from vibroimpact.hardware.recordings.printed_grid import decimal_step
 
@@ -37,7 +37,10 @@ def counted_from_start(
         return (
             list(tables),
             [
-                f"the instants are days of a spreadsheet: they are counted from {days} ({option('rate')} if not)"
+                message(
+                    f"the instants are days of a spreadsheet: they are counted from {days} (",
+                    *(Argument("rate"), " if not)"),
+                )
             ],
             {"source_date": days},
         )
@@ -103,8 +106,11 @@ def _are_days(time: Column) -> bool:
         return False
     if step > _FASTEST and _is_round(step, lost):
         raise DatasetError(
-            f"column of instants: expected seconds, got {known[0]:.6g} and on in steps of {step:.3g}: seconds, "
-            f"or days of a spreadsheet. Give {option('rate')} (samples per second)."
+            message(
+                f"column of instants: expected seconds, got {known[0]:.6g} and on in steps of {step:.3g}: seconds, "
+                "or days of a spreadsheet. Give ",
+                *(Argument("rate"), " (samples per second)."),
+            )
         )
     return True
 

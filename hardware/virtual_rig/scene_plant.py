@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.messages import message
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
 from vibroimpact.hardware.virtual_rig.playback import Playback
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
@@ -44,7 +45,7 @@ class ScenePlant:
         try:
             self._session = MeasuredSession(scene, settings.wiring.signals)
         except UsageError as error:
-            raise UsageError(f"{settings.source}: rig.scene: {error}") from None
+            raise UsageError(message(f"{settings.source}: rig.scene: ", error.message)) from None
         self._noise = scene.noise
         self.seed = scene.noise.seed if scene.noise is not None else 0
         self._session.begin()
@@ -104,7 +105,7 @@ def plant_scene(settings: RigSettings) -> Scene:
     try:
         return scene.unswept().with_values({"execution.impact_limit": MOST_IMPACTS_PER_POINT})
     except SceneError as error:
-        raise UsageError(f"{settings.source}: rig.scene: {error}") from None
+        raise UsageError(message(f"{settings.source}: rig.scene: ", error.message)) from None
 
 
 def opened_plant(settings: RigSettings) -> Plant:

@@ -35,7 +35,6 @@ from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.printable import printable
 from vibroimpact.fmus.terminal import all_was_written, say
-from vibroimpact.fmus.wording import command_line
 from vibroimpact.orchestrator.commands.table import COMMANDS, GROUPS
 from vibroimpact.orchestrator.commands.typer_form import ORDER, add_commands
 
@@ -214,7 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         for word in given:
             refuse_no_text(word)
-        with _no_interrupt_is_lost(), _no_vain_collections(), _no_library_warns(), command_line():
+        with _no_interrupt_is_lost(), _no_vain_collections(), _no_library_warns():
             # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
             typer.main.get_command(_with_called(given)).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:

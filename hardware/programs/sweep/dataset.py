@@ -23,7 +23,7 @@ from vibroimpact.analysis.dataset import (
 from vibroimpact.analysis.dataset.schema import MEASURED_COLUMNS, PERIOD_COLUMNS
 from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.hardware.programs.sweep.analysis import MeasuredStep
 from vibroimpact.hardware.programs.sweep.drive import Drive, SeenLags, clock_error_of
 from vibroimpact.hardware.programs.sweep.plan import planned
@@ -185,8 +185,11 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
         flat = read_flat(path)
     except (DatasetError, ValueError, KeyError, TypeError) as error:
         raise UsageError(
-            f"{path}: expected the dataset of this sweep, got a damaged one ({error}). Move it away, or choose another "
-            f"folder{typed_or_called(' with -o')}."
+            message(
+                f"{path}: expected the dataset of this sweep, got a damaged one ({error}). Move it away, or choose "
+                "another folder",
+                *(WITH_OUTPUT, "."),
+            )
         ) from error
     rows.steps = _steps_of(flat)
     rows.made_by = {name: str(flat.attrs[name]) for name in ("rig", "device", "measured_at")}
@@ -196,8 +199,10 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
 
 def _refused(folder: Path, got: str) -> UsageError:
     return UsageError(
-        f"{folder}: expected a new folder, or that of this sweep, got {got}. "
-        f"Choose another folder{typed_or_called(' with -o')}."
+        message(
+            f"{folder}: expected a new folder, or that of this sweep, got {got}. Choose another folder",
+            *(WITH_OUTPUT, "."),
+        )
     )
 
 

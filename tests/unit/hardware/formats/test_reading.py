@@ -16,8 +16,8 @@ from support.command_line import in_this_process
 
 from vibroimpact.fmus import reader_process
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.messages import typed
 from vibroimpact.fmus.reader_process import ReaderServer
-from vibroimpact.fmus.wording import command_line
 from vibroimpact.hardware.formats import reading, reading_child
 from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.crossing import packed, unpacked
@@ -89,7 +89,7 @@ def test_an_error_that_no_reader_foresaw_is_a_refusal_with_the_name_of_the_file(
     path = tmp_path / "record.csv"
     path.write_text("1,2\n3,4\n")
     said = r"record\.csv: expected a whole text file, got one that cannot be read \(KeyError: 'data'\)\. Report it"
-    with command_line(), pytest.raises(DatasetError, match=said):
+    with pytest.raises(DatasetError, match=said):
         import_recording([path])
 
 
@@ -181,12 +181,20 @@ def test_a_file_that_takes_more_memory_than_its_size_allows_is_refused(
         import_recording([path])
 
 
-def test_messages_name_options_where_a_command_was_typed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("forks", [False, True], ids=["by the server", "by a fork"])
+def test_messages_of_the_other_process_keep_both_spellings(
+    tmp_path: Path, forks: bool, monkeypatch: pytest.MonkeyPatch, server: ReaderServer
+) -> None:
+    monkeypatch.setattr(reader_process, "FORKS", forks)
     path = tmp_path / "record.csv"
     path.write_text("".join(f"{k / 100},{k}\n" for k in range(90)))
-    with command_line():
-        assert "--time-column" in "\n".join(read_file(path).remarks)
-    assert "--" not in "\n".join(read_file(path).remarks)
+    said = "the first column has no heading and ascends: it is taken as the instants"
+    (remark,) = read_file(path).remarks
+    assert (remark, typed(remark)) == (f"{said} (time_column)", f"{said} (--time-column)")
+    path.write_text("no numbers\nin this file\n")
+    with pytest.raises(DatasetError, match=r"Give delimiter and decimal if it is\.$") as raised:
+        read_file(path)
+    assert raised.value.typed.endswith("Give --delimiter and --decimal if it is.")
 
 
 def test_a_file_that_is_gone_meanwhile_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
