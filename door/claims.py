@@ -42,4 +42,4 @@ def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> 
     found = dataset_of(measured_cases([only] if isinstance(only, str) else only))
     if target is not None:
         write_results(found, target, kind="hard_cases")
-    return found.assign_attrs(results_kind="hard_cases")
+    return found

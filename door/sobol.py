@@ -59,4 +59,4 @@ def sensitivity(
     found = sensitivity_report(opened, names, level=level, resamples=resamples, seed=seed)
     if target is not None:
         write_results(found, target, kind="sensitivity")
-    return found.assign_attrs(results_kind="sensitivity")
+    return found

@@ -61,7 +61,7 @@ def accuracy(
     if target is not None:
         write_results(dataset, target, kind="accuracy")
     refuse_unreached(study)
-    return dataset.assign_attrs(results_kind="accuracy")
+    return dataset
 
 
 def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
@@ -100,4 +100,4 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
     if target is not None:
         write_results(dataset, target, kind="effects")
-    return dataset.assign_attrs(results_kind="effects")
+    return dataset

@@ -1,16 +1,18 @@
-"""Write what an analysis found: small NetCDF-4 files (CF-1.11), whole or not there at all."""
+"""What an analysis found: a table of variables for each kind, made into datasets and written as NetCDF-4 (CF-1.11)."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
-from vibroimpact.analysis.dataset.schema import CONVENTIONS
+from vibroimpact.analysis.dataset.schema import CONVENTIONS, UnitSystem, VariableRule
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.fmus.errors import DatasetError
@@ -37,6 +39,105 @@ def _variable(name: str, row: Row) -> xr.Variable:
     if dims in (name, (name,)):
         return new_axis(name, np.asarray(values), attributes)
     return new_variable(dims, np.asarray(values), attributes)
+
+
+TableRow = tuple[str, str, str, str] | tuple[str, str, str, str, str]
+"""A row of a `ResultTable`."""
+SECONDS = "second"
+"""Unit of a time of the machine: s in every system of units."""
+SWEPT = "..."
+"""Stands among the dimensions of a table for those of the runs that results are of."""
+
+
+class ResultTable:
+    """The variables that results of one kind may have.
+
+    Parameters
+    ----------
+    kind : str
+        Of the results, by which `vi.draw` knows how to draw them.
+    *rows : tuple of str
+        Name, dimensions with blanks between them, SI unit, name in words. `text` after these: values are texts. A name
+        that ends in `#` is that of several variables, each with its number; `{WORD}` in words is said with the values.
+
+    Examples
+    --------
+    >>> table = ResultTable("peaks", ("at", "peak", "rad s-1", "frequency of the peak"))
+    >>> table.dataset({"at": [1.0, 2.0]})["at"].attrs
+    {'units': 'rad s-1', 'long_name': 'frequency of the peak'}
+    """
+
+    def __init__(self, kind: str, *rows: TableRow) -> None:
+        self.kind = kind
+        self.rules = {row[0]: _rule(*row) for row in rows}
+
+    def dataset(
+        self,
+        values: Mapping[str, Any],
+        attrs: Mapping[str, Any] | None = None,
+        *,
+        over: tuple[str, ...] = (),
+        coords: Mapping[str, xr.Variable] | None = None,
+        units: UnitSystem = "SI",
+        **said: str,
+    ) -> xr.Dataset:
+        """Return the dataset of some values, with the attribute `results_kind`.
+
+        Parameters
+        ----------
+        values : mapping of str to array
+            By the names of the table; those that are left out are no variables.
+        attrs : mapping, optional
+            Attributes of the dataset.
+        over : tuple of str
+            Dimensions of the runs that results are of.
+        coords : mapping of str to xarray.Variable, optional
+            Their coordinates.
+        units : {"SI", "nondimensional"}
+            In the latter no variable has a unit.
+        **said
+            What stands in the words of variables.
+
+        Raises
+        ------
+        DatasetError
+            The table has no such variable.
+        """
+        rules = {name: self.rule_of(name) for name in values}
+        rows: dict[str, Row] = {}
+        for name, rule in rules.items():
+            dims = tuple(dim for each in rule.dims for dim in (over if each == SWEPT else (each,)))
+            of_one = isinstance(values[name], str)  # numpy keeps a single text as it is
+            array = np.asarray(values[name], dtype=None if of_one else rule.dtype)
+            rows[name] = dims, array, _unit_in(units, rule.unit), rule.long_name.format(**said)
+        found = xr.Dataset(described(rows), coords, dict(attrs or {}))
+        return found.assign_attrs(results_kind=self.kind)
+
+    def rule_of(self, name: str) -> VariableRule:
+        """Return what the table says of a variable.
+
+        Raises
+        ------
+        DatasetError
+            There is no such variable.
+        """
+        if name in self.rules:
+            return self.rules[name]
+        family, number = re.sub(r"\d+$", "#", name), name[len(name.rstrip("0123456789")) :]
+        if family not in self.rules:
+            raise DatasetError(f"{self.kind}: {name}: expected a variable of its table, got another.")
+        rule = self.rules[family]
+        return replace(rule, name=name, long_name=rule.long_name.replace("#", number))
+
+
+def _unit_in(units: UnitSystem, unit: str) -> str:
+    if unit == SECONDS:
+        return "s"
+    return "1" if units == "nondimensional" else unit
+
+
+def _rule(name: str, dims: str, unit: str, words: str, of: str = "") -> VariableRule:
+    return VariableRule(name, tuple(dims.split()), unit, words, object if of == "text" else None)
 
 
 def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import DRAW
 from vibroimpact.analysis.sensitivity.design import design_of
 from vibroimpact.analysis.sensitivity.indices import FEWEST_BLOCKS, sobol_indices
@@ -16,6 +16,28 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 
 LEVEL = 0.95
 RESAMPLES = 1000
+TABLE = ResultTable(
+    "sensitivity",
+    ("first_order", "quantity ... parameter", "1", "first-order Sobol index"),
+    ("total_order", "quantity ... parameter", "1", "total Sobol index"),
+    (
+        "first_order_interval",
+        "quantity ... parameter bound",
+        "1",
+        "{level} bootstrap interval of the first-order Sobol index",
+    ),
+    (
+        "total_order_interval",
+        "quantity ... parameter bound",
+        "1",
+        "{level} bootstrap interval of the total Sobol index",
+    ),
+    ("blocks", "quantity ...", "1", "blocks of the design that were used"),
+    ("quantity", "quantity", "1", "quantity whose variance is shared out", "text"),
+    ("parameter", "parameter", "1", "parameter that was drawn", "text"),
+    ("bound", "bound", "1", "end of an interval", "text"),
+    ("quantity_name", "quantity", "1", "quantity in words", "text"),
+)
 
 
 def sensitivity_report(
@@ -65,40 +87,28 @@ def sensitivity_report(
     others = [str(dim) for dim in dataset["outcome"].dims if dim != DRAW]
     columns = [found[name].transpose(DRAW, *others).values for name in names]
     shape = (len(names), *columns[0].shape[1:])
-    values = np.stack(columns, axis=1).reshape(columns[0].shape[0], -1)
-    indices = sobol_indices(*design.parts(values), level=level, resamples=resamples, seed=seed)
-    dims = ("quantity", *others, "parameter")
-    words = f"{100.0 * level:g} % bootstrap interval of the"
+    runs = np.stack(columns, axis=1).reshape(columns[0].shape[0], -1)
+    indices = sobol_indices(*design.parts(runs), level=level, resamples=resamples, seed=seed)
     keys = len(design.names)
-    rows: dict[str, Row] = {
-        "first_order": (dims, indices.first_order.reshape(*shape, keys), "1", "first-order Sobol index"),
-        "total_order": (dims, indices.total_order.reshape(*shape, keys), "1", "total Sobol index"),
-        "first_order_interval": (
-            (*dims, "bound"), indices.first_interval.reshape(*shape, keys, 2), "1", f"{words} first-order Sobol index"
-        ),
-        "total_order_interval": (
-            (*dims, "bound"), indices.total_interval.reshape(*shape, keys, 2), "1", f"{words} total Sobol index"
-        ),
-        "blocks": (dims[:-1], indices.blocks.reshape(shape), "1", "blocks of the design that were used"),
-    }  # fmt: skip
-    coords: dict[str, Row] = {
-        "quantity": ("quantity", np.array(names, dtype=object), "1", "quantity whose variance is shared out"),
-        "parameter": ("parameter", np.array(design.names, dtype=object), "1", "parameter that was drawn"),
-        "bound": ("bound", np.array(["lower", "upper"], dtype=object), "1", "end of an interval"),
+    values = {
+        "first_order": indices.first_order.reshape(*shape, keys),
+        "total_order": indices.total_order.reshape(*shape, keys),
+        "first_order_interval": indices.first_interval.reshape(*shape, keys, 2),
+        "total_order_interval": indices.total_interval.reshape(*shape, keys, 2),
+        "blocks": indices.blocks.reshape(shape),
+        "quantity": names,
+        "parameter": list(design.names),
+        "bound": ["lower", "upper"],
+        "quantity_name": [found[name].attrs["long_name"] for name in names],
     }
     coordinates = {
-        name: c.variable.copy(deep=False)
+        str(name): c.variable.copy(deep=False)
         for name, c in dataset.coords.items()
         if c.dims and set(c.dims) <= set(others)
     }
     for coordinate in coordinates.values():
         coordinate.attrs.setdefault("units", "1")  # the words of a direction have none
-    report = xr.Dataset(described(rows), described(coords) | coordinates)
-    report["quantity_name"] = (
-        "quantity",
-        np.array([found[n].attrs["long_name"] for n in names], dtype=object),
-    )
-    report["quantity_name"].attrs = {"units": "1", "long_name": "quantity in words"}
+    report = TABLE.dataset(values, over=tuple(others), coords=coordinates, level=f"{100.0 * level:g} %")
     remarks = list(_remarks(report, design.blocks))
     if not np.isfinite(report.total_order.values).any():
         raise DatasetError(f"sensitivity: expected a quantity that varies, got none: {' '.join(remarks)}")

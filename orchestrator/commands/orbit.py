@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.commands.beginning import begun, files_of, is_seed
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.operations.orbit import FindOrbits
 from vibroimpact.orchestrator.orbits.find import find_orbits
-from vibroimpact.orchestrator.orbits.follow import scene_attributes
+from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
 

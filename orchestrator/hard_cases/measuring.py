@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from operator import attrgetter
 
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import described
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase
@@ -25,7 +25,7 @@ from vibroimpact.orchestrator.hard_cases.rests import CASES as RESTS
 from vibroimpact.orchestrator.hard_cases.scales import CASES as SCALES
 from vibroimpact.orchestrator.hard_cases.several import CASES as SEVERAL
 from vibroimpact.orchestrator.hard_cases.yielding import CASES as YIELDING
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
+from vibroimpact.orchestrator.run.provenance import program_attributes
 
 CASES: tuple[HardCase, ...] = (
     *(*FINDING, *IMPACTS, *PLACES, *RESTS),
@@ -33,6 +33,48 @@ CASES: tuple[HardCase, ...] = (
 )
 """In the order of docs/hard_cases.md."""
 _ONLY = Argument("only")
+TABLE = ResultTable(
+    "hard_cases",
+    ("figure", "case", "1", "what was measured"),
+    ("bound", "case", "1", "what it may be at most"),
+    ("is_met", "case", "1", "the figure is within its bound"),
+    ("seconds", "case", "s", "processor time"),
+    ("x", "case point", "1", "abscissa of what is drawn, in the unit of x_label"),
+    ("y", "case point", "1", "ordinate of what is drawn, in the unit of y_label"),
+    ("x_log", "case", "1", "its abscissa is logarithmic"),
+    ("y_log", "case", "1", "its ordinate is logarithmic"),
+    ("is_bounded", "case", "1", "the bound is one of the ordinate"),
+    ("name", "case", "1", "name of the case", "text"),
+    ("theme", "case", "1", "what it is about", "text"),
+    ("hard", "case", "1", "what is hard", "text"),
+    ("claim", "case", "1", "what is to hold", "text"),
+    ("reference", "case", "1", "what the figure is measured against", "text"),
+    ("of", "case", "1", "what the figure is", "text"),
+    ("verdict", "case", "1", "met, wrong or slow", "text"),
+    ("failure", "case", "1", "why it did not run", "text"),
+    ("x_label", "case", "1", "name of the abscissa", "text"),
+    ("y_label", "case", "1", "name of the ordinate", "text"),
+)
+_PATHS = {
+    "figure": "found.figure",
+    "bound": "case.bound",
+    "is_met": "is_met",
+    "seconds": "seconds",
+    "x_log": "found.curve.x_log",
+    "y_log": "found.curve.y_log",
+    "is_bounded": "found.curve.is_bounded",
+    "name": "case.name",
+    "theme": "case.theme",
+    "hard": "case.title",
+    "claim": "case.claim",
+    "reference": "case.reference",
+    "of": "case.of",
+    "verdict": "verdict",
+    "failure": "failure",
+    "x_label": "found.curve.x_label",
+    "y_label": "found.curve.y_label",
+}
+"""Where `Measured` has the value of a variable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,60 +180,13 @@ def _measured(case: HardCase, clock: Callable[[], float]) -> Measured:
 
 
 def dataset_of(measured: Sequence[Measured]) -> xr.Dataset:
-    """Return what was measured as a dataset, for `write_results` of kind `hard_cases` and for figures."""
+    """Return what was measured as a dataset of kind `hard_cases`."""
     points = max((len(one.found.curve.x) for one in measured), default=0)
     x, y = (np.full((len(measured), points), np.nan) for _ in range(2))
     for place, one in enumerate(measured):
         x[place, : len(one.found.curve.x)] = one.found.curve.x
         y[place, : len(one.found.curve.y)] = one.found.curve.y
-    dataset = xr.Dataset(
-        described(
-            {
-                "figure": ("case", [one.found.figure for one in measured], "1", "what was measured"),
-                "bound": ("case", [one.case.bound for one in measured], "1", "what it may be at most"),
-                "is_met": ("case", [one.is_met for one in measured], "1", "the figure is within its bound"),
-                "seconds": ("case", [one.seconds for one in measured], "s", "processor time"),
-                "x": (("case", "point"), x, "1", "abscissa of what is drawn, in the unit of x_label"),
-                "y": (("case", "point"), y, "1", "ordinate of what is drawn, in the unit of y_label"),
-                "x_log": (
-                    "case",
-                    [one.found.curve.x_log for one in measured],
-                    "1",
-                    "its abscissa is logarithmic",
-                ),
-                "y_log": (
-                    "case",
-                    [one.found.curve.y_log for one in measured],
-                    "1",
-                    "its ordinate is logarithmic",
-                ),
-                "is_bounded": (
-                    "case",
-                    [one.found.curve.is_bounded for one in measured],
-                    "1",
-                    "the bound is one of the ordinate",
-                ),
-            }
-        )
-    )
-    words = {
-        "name": ("name of the case", [one.case.name for one in measured]),
-        "theme": ("what it is about", [one.case.theme for one in measured]),
-        "hard": ("what is hard", [one.case.title for one in measured]),
-        "claim": ("what is to hold", [one.case.claim for one in measured]),
-        "reference": ("what the figure is measured against", [one.case.reference for one in measured]),
-        "of": ("what the figure is", [one.case.of for one in measured]),
-        "verdict": ("met, wrong or slow", [one.verdict for one in measured]),
-        "failure": ("why it did not run", [one.failure for one in measured]),
-        "x_label": ("name of the abscissa", [one.found.curve.x_label for one in measured]),
-        "y_label": ("name of the ordinate", [one.found.curve.y_label for one in measured]),
-    }
-    for name, (meaning, texts) in words.items():
-        dataset[name] = ("case", np.array(texts, dtype=object), {"units": "1", "long_name": meaning})
+    columns = {name: [attrgetter(path)(one) for one in measured] for name, path in _PATHS.items()}
     missed = [one.case.name for one in measured if not one.is_met]
-    return dataset.assign_attrs(
-        title="Hard cases",
-        missed=", ".join(missed),
-        versions=json.dumps(versions()),
-        git_commit=git_commit(),
-    )
+    attributes = {"title": "Hard cases", "missed": ", ".join(missed)} | program_attributes()
+    return TABLE.dataset({**columns, "x": x, "y": y}, attributes)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.orbits.basins import (
     BEYOND_A_STOP,
     UNDECIDED,
@@ -24,12 +24,37 @@ from vibroimpact.analysis.orbits.body import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow, start_names
-from vibroimpact.orchestrator.orbits.follow import scene_attributes
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
+from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 
 HISTORY = "basins of attraction found by vibroimpact"
+TABLE = ResultTable(
+    "basins",
+    ("displacement_start", "displacement_start", "m", "displacement{of} at the start"),
+    ("velocity_start", "velocity_start", "m s-1", "velocity{of} at the start"),
+    ("basin", "velocity_start displacement_start", "1", "attractor, from 0; -1 undecided, -2 beyond a stop"),
+    ("attractor_name", "attractor", "1", "what it is", "text"),
+    ("basin_fraction", "attractor", "1", "share of the starts that end on it"),
+    ("attractor_displacement", "attractor period", "m", "displacement at forcing phase 0"),
+    ("attractor_velocity", "attractor period", "m s-1", "velocity at forcing phase 0"),
+    (
+        "attractor_radius",
+        "attractor",
+        "1",
+        "distance from which starts were seen to come back, over the size of the motion",
+    ),
+    (
+        "attractor_impacts",
+        "attractor stop",
+        "1",
+        "mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter",
+    ),
+    ("border_fraction", "", "1", "share of the starts next to one that ends elsewhere"),
+    ("border_dimension", "", "1", "dimension of the border between basins"),
+    ("border_dimension_error", "", "1", "standard error of it"),
+)
 POINTS = 200
 """Starts along each axis, unless it is said."""
 MOST_STARTS = 16_000_000
@@ -176,76 +201,36 @@ def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span,
 
 def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins) -> xr.Dataset:
     """Return what is known of a plane."""
-    plain = scene.units == "nondimensional"
-    metre, speed = ("1", "1") if plain else ("m", "m s-1")
     labels = found.labels.reshape(y.size, x.size)
     across, along = _axes(scene, plane.number)
     most = max([len(each.states) for each in found.attractors], default=0)
     points = np.full((len(found.attractors), most, 2), np.nan)
     for place, attractor in enumerate(found.attractors):
         points[place, : len(attractor.states)] = attractor.states[:, [across, along]]
-    share = border_share(labels)
     dimension = border_dimension(labels)
-    rows: dict[str, Row] = {
-        "basin": (
-            ("velocity_start", "displacement_start"),
-            labels,
-            "1",
-            "attractor, from 0; -1 undecided, -2 beyond a stop",
+    values = {
+        "displacement_start": x,
+        "velocity_start": y,
+        "basin": labels,
+        "attractor_name": found.names,
+        "basin_fraction": found.fractions,
+        "attractor_displacement": points[..., 0],
+        "attractor_velocity": points[..., 1],
+        "attractor_radius": np.array([each.radius for each in found.attractors]),
+        "attractor_impacts": np.array([each.impacts for each in found.attractors]).reshape(
+            -1, len(scene.stops)
         ),
-        "attractor_name": ("attractor", np.array(found.names, dtype=object), "1", "what it is"),
-        "basin_fraction": ("attractor", found.fractions, "1", "share of the starts that end on it"),
-        "attractor_displacement": (
-            ("attractor", "period"),
-            points[..., 0],
-            metre,
-            "displacement at forcing phase 0",
-        ),
-        "attractor_velocity": (("attractor", "period"), points[..., 1], speed, "velocity at forcing phase 0"),
-        "attractor_radius": (
-            "attractor",
-            np.array([each.radius for each in found.attractors]),
-            "1",
-            "distance from which starts were seen to come back, over the size of the motion",
-        ),
-        "attractor_impacts": (
-            ("attractor", "stop"),
-            np.array([each.impacts for each in found.attractors]).reshape(-1, len(scene.stops)),
-            "1",
-            "mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter",
-        ),
-        "border_fraction": ((), share, "1", "share of the starts next to one that ends elsewhere"),
-        "border_dimension": (
-            (),
-            np.nan if dimension is None else dimension.value,
-            "1",
-            "dimension of the border between basins",
-        ),
-        "border_dimension_error": (
-            (),
-            np.nan if dimension is None else dimension.error,
-            "1",
-            "standard error of it",
-        ),
+        "border_fraction": border_share(labels),
+        "border_dimension": np.nan if dimension is None else dimension.value,
+        "border_dimension_error": np.nan if dimension is None else dimension.error,
     }
-    of = _element(scene, plane.number)
-    axes = {
-        "displacement_start": (
-            "displacement_start",
-            x,
-            {"units": metre, "long_name": f"displacement{of} at the start"},
-        ),
-        "velocity_start": ("velocity_start", y, {"units": speed, "long_name": f"velocity{of} at the start"}),
+    attributes = scene_attributes(scene, HISTORY) | {
+        "units_system": scene.units,
+        "decided": found.decided,
+        "chaotic_by_sample": found.told_by_sample,
+        "undetected_share_below": found.undetected_share_below,
     }
-    return xr.Dataset(described(rows), axes).assign_attrs(
-        scene_attributes(scene, HISTORY)
-        | {
-            "units_system": scene.units,
-            "decided": found.decided,
-            "chaotic_by_sample": found.told_by_sample,
-            "undetected_share_below": found.undetected_share_below,
-        }
-    )
+    return TABLE.dataset(values, attributes, units=scene.units, of=_element(scene, plane.number))
 
 
 def _element(scene: Scene, number: int | None) -> str:

@@ -16,16 +16,30 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.orbits.control_parts import SEEN, coupled
 from vibroimpact.orchestrator.orbits.control_plan import (
     LONGEST_STAY,
     ControlPlan,
 )
-from vibroimpact.orchestrator.orbits.follow import scene_attributes
+from vibroimpact.orchestrator.run.provenance import scene_attributes
 
 HISTORY = "periodic orbits kept by vibroimpact"
+TABLE = ResultTable(
+    "control",
+    ("impact_time", "impact", "s", "time of the impact"),
+    ("impact_phase", "impact", "rad", "forcing phase of the impact"),
+    ("impact_velocity", "impact", "m s-1", "impact velocity"),
+    ("forcing_amplitude", "impact", "N", "forcing amplitude of the flight before"),
+    ("correction", "impact", "1", "correction of the forcing amplitude, relative"),
+    ("angular_frequency", "impact", "rad s-1", "angular frequency of the flight before"),
+    ("impact_orbit", "impact", "1", "number of the orbit that was kept then, from 0"),
+    ("orbit_angular_frequency", "orbit", "rad s-1", "angular frequency of the orbit"),
+    ("orbit_velocity", "orbit", "m s-1", "impact velocity of the orbit"),
+    ("orbit_multiplier", "orbit", "1", "size of the largest multiplier"),
+    ("orbit_impacts", "orbit", "1", "impacts at this orbit"),
+)
 AT_THE_END = 20
 """Impacts at the last angular frequency of a plan."""
 CHUNK = 16
@@ -149,50 +163,27 @@ def _run(importer: Importer, found: Controlled, told: Told | None) -> None:
 
 def _dataset(found: Controlled) -> xr.Dataset:
     plan = found.plan
-    plain = plan.scene.units == "nondimensional"
-    units = {name: "1" if plain else unit for name, unit in _UNITS.items()}
     table = np.array(found.impacts, dtype=np.float64).reshape(-1, 6)
     at = table[:, 5].astype(np.int64)
-    multipliers = np.array([abs(orbit.multipliers[0]) for orbit in plan.orbits])
     visits = np.bincount(at, minlength=len(plan.orbits)) if at.size else np.zeros(len(plan.orbits), np.int64)
-    rows: dict[str, Row] = {
-        "impact_time": ("impact", table[:, 0], units["time"], "time of the impact"),
-        "impact_phase": ("impact", table[:, 1], "1" if plain else "rad", "forcing phase of the impact"),
-        "impact_velocity": ("impact", table[:, 2], units["velocity"], "impact velocity"),
-        "forcing_amplitude": (
-            "impact",
-            table[:, 3],
-            units["force"],
-            "forcing amplitude of the flight before",
-        ),
-        "correction": (
-            "impact",
-            table[:, 3] / plan.amplitude - 1.0,
-            "1",
-            "correction of the forcing amplitude, relative",
-        ),
-        "angular_frequency": ("impact", table[:, 4], units["rate"], "angular frequency of the flight before"),
-        "impact_orbit": ("impact", at, "1", "number of the orbit that was kept then, from 0"),
-        "orbit_angular_frequency": (
-            "orbit",
-            np.array([orbit.body.angular_frequency for orbit in plan.orbits]),
-            units["rate"],
-            "angular frequency of the orbit",
-        ),
-        "orbit_velocity": (
-            "orbit",
-            np.array([float(orbit.velocities[0]) for orbit in plan.orbits]),
-            units["velocity"],
-            "impact velocity of the orbit",
-        ),
-        "orbit_multiplier": ("orbit", multipliers, "1", "size of the largest multiplier"),
-        "orbit_impacts": ("orbit", visits, "1", "impacts at this orbit"),
+    values = {
+        "impact_time": table[:, 0],
+        "impact_phase": table[:, 1],
+        "impact_velocity": table[:, 2],
+        "forcing_amplitude": table[:, 3],
+        "correction": table[:, 3] / plan.amplitude - 1.0,
+        "angular_frequency": table[:, 4],
+        "impact_orbit": at,
+        "orbit_angular_frequency": [orbit.body.angular_frequency for orbit in plan.orbits],
+        "orbit_velocity": [float(orbit.velocities[0]) for orbit in plan.orbits],
+        "orbit_multiplier": [abs(orbit.multipliers[0]) for orbit in plan.orbits],
+        "orbit_impacts": visits,
     }
     settings = {
         f"control_{f.name}": getattr(plan.settings, f.name) for f in dataclasses.fields(plan.settings)
     }
     ends = {} if plan.ends_at is None else {"branch_ends_at": plan.ends_at}
-    return xr.Dataset(described(rows)).assign_attrs(
+    attributes = (
         scene_attributes(plan.scene, HISTORY)
         | settings
         | ends
@@ -204,6 +195,4 @@ def _dataset(found: Controlled) -> xr.Dataset:
             "amplitude": plan.amplitude,
         }
     )
-
-
-_UNITS = {"time": "s", "velocity": "m s-1", "force": "N", "rate": "rad s-1"}
+    return TABLE.dataset(values, attributes, units=plan.scene.units)

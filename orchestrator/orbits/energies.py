@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
-from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.results import ResultTable
+from vibroimpact.analysis.dataset.schema import UnitSystem
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.energies import (
     OrbitEnergies,
@@ -21,33 +22,82 @@ from vibroimpact.analysis.orbits.energies import (
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, place_of, scene_of, why_without_orbit
+from vibroimpact.orchestrator.orbits.runs import (
+    Bodies,
+    ImpactsOf,
+    OnSweep,
+    place_of,
+    scene_of,
+    units_of,
+    why_without_orbit,
+)
 from vibroimpact.orchestrator.run.progress import Progress
+from vibroimpact.orchestrator.run.provenance import runs_attributes
 
-_OF_MODES: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], Floats]]] = {
-    "residual_energy": ("J", "work of the force less loss to damping", lambda e: e.residual),
-    "forcing_work": ("J", "work of the force", lambda e: e.forcing.sum(axis=0)),
-    "damping_loss": ("J", "loss to damping", lambda e: e.damping.sum(axis=0)),
-    "impact_change": ("J", "change of energy at the impacts", lambda e: e.change.sum(axis=0)),
-    "mean_kinetic_energy": ("J", "mean kinetic energy", lambda e: e.mean_kinetic),
-    "natural_frequency": ("rad s-1", "natural angular frequency", lambda e: e.orbit.body.frequencies),
+TABLE = ResultTable(
+    "energies",
+    ("mode", "mode", "1", "number of the mode, the slowest first"),
+    (
+        "residual_energy",
+        "... mode",
+        "J",
+        "work of the force less loss to damping of the mode, over the orbit",
+    ),
+    ("forcing_work", "... mode", "J", "work of the force of the mode, over the orbit"),
+    ("damping_loss", "... mode", "J", "loss to damping of the mode, over the orbit"),
+    ("impact_change", "... mode", "J", "change of energy at the impacts of the mode, over the orbit"),
+    ("mean_kinetic_energy", "... mode", "J", "mean kinetic energy of the mode, over the orbit"),
+    ("natural_frequency", "... mode", "rad s-1", "natural angular frequency of the mode"),
+    ("impacts", "...", "1", "impacts in the orbit, p of P(p,q)"),
+    ("periods", "...", "1", "forcing periods in the orbit, q of P(p,q)"),
+    (
+        "contact_energy",
+        "...",
+        "J",
+        "energy that the impacts meet, half of contact mass times squared velocity",
+    ),
+    ("contact_loss", "...", "J", "energy lost at the impacts"),
+    ("residual_restitution", "...", "1", "restitution that the residual energy says"),
+    (
+        "identity_error",
+        "...",
+        "1",
+        "residual energy less loss at the impacts, over the energy that they meet",
+    ),
+    ("energy_before", "impact mode", "J", "energy of the mode just before the impact"),
+    ("energy_after", "impact mode", "J", "energy of the mode just after the impact"),
+    ("energy_change", "impact mode", "J", "change of the energy of the mode at the impact"),
+    ("flight_forcing_work", "impact mode", "J", "work of the force on the mode until the next impact"),
+    ("flight_damping_loss", "impact mode", "J", "loss of the mode to damping until the next impact"),
+    ("velocity_transfer", "contact mode other_mode", "1", "matrix of the modal velocities at an impact"),
+    ("energy_transfer", "contact mode other_mode", "1", "matrix of the kinetic energy"),
+    ("contact_mass", "contact", "kg", "mass that an impact meets, of all modes that are kept"),
+    ("impact_phase", "impact", "rad", "forcing phase at impact, from that of the first period on"),
+    ("impact_velocity", "impact", "m s-1", "velocity of approach just before impact"),
+    ("impact_contact", "impact", "1", "number of the stop that was hit, from 1"),
+    (
+        "transient",
+        "...",
+        "1",
+        "largest difference of a recorded velocity from that of the orbit, over the largest",
+    ),
+    ("reason", "...", "1", "why a run has no orbit, else empty", "text"),
+)
+_OF_MODES: Mapping[str, Callable[[OrbitEnergies], Floats]] = {
+    "residual_energy": lambda e: e.residual,
+    "forcing_work": lambda e: e.forcing.sum(axis=0),
+    "damping_loss": lambda e: e.damping.sum(axis=0),
+    "impact_change": lambda e: e.change.sum(axis=0),
+    "mean_kinetic_energy": lambda e: e.mean_kinetic,
+    "natural_frequency": lambda e: e.orbit.body.frequencies,
 }
-_OF_RUNS: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], float]]] = {
-    "impacts": ("1", "impacts in the orbit, p of P(p,q)", lambda e: e.orbit.phases.size),
-    "periods": ("1", "forcing periods in the orbit, q of P(p,q)", lambda e: e.orbit.periods),
-    "contact_energy": ("J", "energy that the impacts meet, half of contact mass times squared velocity",
-                       lambda e: e.kinetic.sum()),
-    "contact_loss": ("J", "energy lost at the impacts", lambda e: e.lost.sum()),
-    "residual_restitution": ("1", "restitution that the residual energy says", lambda e: e.restitution.value),
-    "identity_error": ("1", "residual energy less loss at the impacts, over the energy that they meet",
-                       lambda e: e.identity_error),
-}  # fmt: skip
-_OF_IMPACTS: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], Floats]]] = {
-    "energy_before": ("J", "energy of the mode just before the impact", lambda e: e.before),
-    "energy_after": ("J", "energy of the mode just after the impact", lambda e: e.after),
-    "energy_change": ("J", "change of the energy of the mode at the impact", lambda e: e.change),
-    "flight_forcing_work": ("J", "work of the force on the mode until the next impact", lambda e: e.forcing),
-    "flight_damping_loss": ("J", "loss of the mode to damping until the next impact", lambda e: e.damping),
+_OF_RUNS: Mapping[str, Callable[[OrbitEnergies], float]] = {
+    "impacts": lambda e: e.orbit.phases.size,
+    "periods": lambda e: e.orbit.periods,
+    "contact_energy": lambda e: e.kinetic.sum(),
+    "contact_loss": lambda e: e.lost.sum(),
+    "residual_restitution": lambda e: e.restitution.value,
+    "identity_error": lambda e: e.identity_error,
 }
 Found = OrbitEnergies | str
 _MANY = 5000
@@ -103,16 +153,13 @@ def energies(
     for place in chosen:
         found.append(_of_run(bodies, impacts, runs, place))
         seen.advance(1)
-    plain = dataset.attrs.get("units_system") == "nondimensional"
-    kept = {name: dataset.attrs[name] for name in ("title", "scene", "units_system") if name in dataset.attrs}
-    if len(found) == 1:
-        only = found[0][0]
-        if isinstance(only, str):
-            raise DatasetError(f"energies: expected a run with a periodic orbit, got none: {only}.")
-        made = _of_one(only, found[0][1], plain)
-    else:
-        made = _on_sweep(dataset, found, bodies.most_modes, plain)
-    return made.assign_attrs(kept)
+    attrs, units = runs_attributes(dataset.attrs), units_of(dataset)
+    if len(found) > 1:
+        return _on_sweep(dataset, found, bodies.most_modes, attrs, units)
+    only, distance = found[0]
+    if isinstance(only, str):
+        raise DatasetError(f"energies: expected a run with a periodic orbit, got none: {only}.")
+    return _of_one(only, distance, attrs, units)
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:
@@ -127,91 +174,53 @@ def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) ->
         return str(problem).removeprefix("orbit: "), np.nan
 
 
-def _units(rows: Mapping[str, Row], plain: bool) -> dict[str, Any]:
-    """Return variables with their attributes; of a nondimensional scene they have no unit."""
-    return described({name: (dims, values, "1" if plain else unit, words)
-                      for name, (dims, values, unit, words) in rows.items()})  # fmt: skip
-
-
-def _mode_words(words: str) -> str:
-    return f"{words} of the mode, over the orbit" if "natural" not in words else f"{words} of the mode"
-
-
-_TRANSIENT = "largest difference of a recorded velocity from that of the orbit, over the largest"
-
-
-def _of_one(found: OrbitEnergies, distance: float, plain: bool) -> xr.Dataset:
-    orbit, body = found.orbit, found.orbit.body
-    rows: dict[str, Row] = {
-        name: ("mode", of(found), unit, _mode_words(words)) for name, (unit, words, of) in _OF_MODES.items()
+def _of_one(found: OrbitEnergies, distance: float, attrs: Mapping[str, Any], units: UnitSystem) -> xr.Dataset:
+    orbit, contacts = found.orbit, found.orbit.body.contacts
+    values: dict[str, Any] = {
+        "mode": np.arange(1, orbit.body.frequencies.size + 1),
+        **{name: of(found) for name, of in _OF_MODES.items()},
+        **{name: of(found) for name, of in _OF_RUNS.items()},
+        "energy_before": found.before,
+        "energy_after": found.after,
+        "energy_change": found.change,
+        "flight_forcing_work": found.forcing,
+        "flight_damping_loss": found.damping,
+        "velocity_transfer": [velocity_transfer(contact) for contact in contacts],
+        "energy_transfer": [energy_transfer(contact) for contact in contacts],
+        "contact_mass": [contact.mass for contact in contacts],
+        "impact_phase": orbit.phases,
+        "impact_velocity": orbit.velocities,
+        "impact_contact": orbit.contacts + 1,
+        "transient": distance,
     }
-    rows |= {name: ((), of(found), unit, words) for name, (unit, words, of) in _OF_RUNS.items()}
-    rows |= {
-        name: (("impact", "mode"), of(found), unit, words) for name, (unit, words, of) in _OF_IMPACTS.items()
-    }
-    matrices = (("velocity_transfer", velocity_transfer), ("energy_transfer", energy_transfer))
-    for name, of in matrices:
-        words = (
-            "matrix of the modal velocities at an impact"
-            if of is velocity_transfer
-            else "matrix of the kinetic energy"
-        )
-        values = np.array([of(contact) for contact in body.contacts])
-        rows[name] = (("contact", "mode", "other_mode"), values, "1", words)
-    masses = np.array([contact.mass for contact in body.contacts])
-    rows["contact_mass"] = ("contact", masses, "kg", "mass that an impact meets, of all modes that are kept")
-    rows["impact_phase"] = (
-        "impact",
-        orbit.phases,
-        "rad",
-        "forcing phase at impact, from that of the first period on",
-    )
-    rows["impact_velocity"] = ("impact", orbit.velocities, "m s-1", "velocity of approach just before impact")
-    rows["impact_contact"] = ("impact", orbit.contacts + 1, "1", "number of the stop that was hit, from 1")
-    rows["transient"] = ((), distance, "1", _TRANSIENT)
-    made = xr.Dataset(_units(rows, plain), _modes(body.frequencies.size))
-    return made.assign_attrs(orbit=orbit.name, is_stable=int(orbit.is_stable))
+    said = {"orbit": orbit.name, "is_stable": int(orbit.is_stable)}
+    return TABLE.dataset(values, said | dict(attrs), units=units)
 
 
-def _modes(count: int) -> dict[str, Any]:
-    number = np.arange(1, count + 1)
-    return described({"mode": ("mode", number, "1", "number of the mode, the slowest first")})
-
-
-def _on_sweep(dataset: xr.Dataset, found: list[tuple[Found, float]], most: int, plain: bool) -> xr.Dataset:
+def _on_sweep(
+    dataset: xr.Dataset,
+    found: list[tuple[Found, float]],
+    most: int,
+    attrs: Mapping[str, Any],
+    units: UnitSystem,
+) -> xr.Dataset:
     """Return the energies of all runs on the dimensions of the dataset."""
-    run_id = dataset["run_id"].values
-    place = dict(zip(dataset.vibroimpact.runs["run_id"].values.tolist(), range(len(found)), strict=True))
-    index = np.array([place.get(int(number), -1) for number in run_id.ravel()]).reshape(run_id.shape)
-    dims = tuple(map(str, dataset["run_id"].dims))
-
-    def placed(values: Floats) -> Floats:
-        return np.asarray(np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[index])
-
-    rows: dict[str, Row] = {}
-    for name, (unit, words, of) in _OF_MODES.items():
-        values = np.full((len(found), most), np.nan)
+    runs = OnSweep(dataset)
+    values: dict[str, Any] = {"mode": np.arange(1, most + 1)}
+    for name, of in _OF_MODES.items():
+        table = np.full((len(found), most), np.nan)
         for row, (each, _) in enumerate(found):
             if not isinstance(each, str):
                 numbers = of(each)
-                values[row, : numbers.size] = numbers
-        rows[name] = ((*dims, "mode"), placed(values), unit, _mode_words(words))
-    for name, (unit, words, one) in _OF_RUNS.items():
+                table[row, : numbers.size] = numbers
+        values[name] = runs.placed(table)
+    for name, one in _OF_RUNS.items():
         numbers = np.array([np.nan if isinstance(each, str) else one(each) for each, _ in found])
-        rows[name] = (dims, placed(numbers), unit, words)
-    rows["transient"] = (dims, placed(np.array([distance for _, distance in found])), "1", _TRANSIENT)
-    reasons = np.array(
-        [*(each if isinstance(each, str) else "" for each, _ in found), "no run"], dtype=object
-    )
-    rows["reason"] = (dims, reasons[index], "1", "why a run has no orbit, else empty")
-    coords = {
-        name: one.variable for name, one in dataset.coords.items() if set(one.dims) <= set(dims) and one.dims
-    }
-    if taken := sorted({*rows, "mode"} & {*map(str, coords), *dims}):
+        values[name] = runs.placed(numbers)
+    values["transient"] = runs.placed(np.array([distance for _, distance in found]))
+    values["reason"] = runs.texts([each if isinstance(each, str) else "" for each, _ in found])
+    if taken := sorted(set(values) & {*runs.coords, *runs.dims}):
         raise DatasetError(
             f"energies: {taken[0]}: expected a swept key or dimension of another name. Rename it."
         )
-    for one in coords.values():
-        one.attrs.setdefault("units", "1")
-        one.attrs.setdefault("long_name", "swept")
-    return xr.Dataset(_units(rows, plain), _modes(most) | coords)
+    return TABLE.dataset(values, attrs, over=runs.dims, coords=runs.coords, units=units)

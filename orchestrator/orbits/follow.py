@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ from vibroimpact.orchestrator.orbits.find import orbit_of_run
 from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
+from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
@@ -40,17 +39,6 @@ SAME_ORBIT = 0.02
 """Distance, over the range of the parameter and a radian, at which an orbit is on a branch that is known."""
 
 Told = Callable[[Branch, BranchOrbit], None]
-
-
-def scene_attributes(scene: Scene, history: str) -> dict[str, Any]:
-    """Return the attributes of a file of orbits of a scene."""
-    return {
-        "title": scene.title or Path(scene.source).stem,
-        "history": history,
-        "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
-        "scene": scene.text,
-        "git_commit": git_commit(),
-    }
 
 
 @dataclass(slots=True)

@@ -8,10 +8,23 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
-from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.orbits.exponents import ExponentError, Exponents, exponents_of
-from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, scene_of
+from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, OnSweep, scene_of, units_of
+from vibroimpact.orchestrator.run.provenance import runs_attributes
+
+TABLE = ResultTable(
+    "lyapunov",
+    ("lyapunov_exponent", "... exponent", "1", "Lyapunov exponent per impact"),
+    ("standard_error", "... exponent", "1", "standard error of the exponent"),
+    ("impact_interval", "...", "s", "mean time from impact to impact"),
+    ("dimension", "...", "1", "Kaplan-Yorke dimension of the attractor of the impact map"),
+    ("impacts", "...", "1", "impacts that counted"),
+    ("sum_error", "...", "1", "sum of the exponents less its exact value, over their size"),
+    ("reason", "...", "1", "why a run has no exponents, else empty", "text"),
+    ("exponent", "exponent", "1", "exponent, the largest first"),
+)
 
 
 def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
@@ -47,9 +60,7 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     scene, runs = scene_of(dataset, "lyapunov"), dataset.vibroimpact.runs
     bodies, impacts = Bodies(scene, runs), ImpactsOf(dataset)
     found = [_of_run(bodies, impacts, runs, place) for place in range(runs.sizes["run"])]
-    plain = dataset.attrs.get("units_system") == "nondimensional"
-    kept = {name: dataset.attrs[name] for name in ("title", "scene", "units_system") if name in dataset.attrs}
-    return _on_sweep(dataset, found, 2 * bodies.most_modes, "1" if plain else "s").assign_attrs(kept)
+    return _on_sweep(dataset, found, 2 * bodies.most_modes)
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> Exponents | str:
@@ -67,47 +78,25 @@ def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) ->
         return str(problem).removeprefix("lyapunov: ")
 
 
-def _on_sweep(dataset: xr.Dataset, found: list[Exponents | str], most: int, time_unit: str) -> xr.Dataset:
-    run_id = dataset["run_id"].values
-    place = dict(zip(dataset.vibroimpact.runs["run_id"].values.tolist(), range(len(found)), strict=True))
-    index = np.array([place.get(int(number), -1) for number in run_id.ravel()]).reshape(run_id.shape)
-    dims = tuple(map(str, dataset["run_id"].dims))
-    table, errors = np.full((len(found) + 1, most), np.nan), np.full((len(found) + 1, most), np.nan)
-    single = np.full((len(found) + 1, 4), np.nan)
+def _on_sweep(dataset: xr.Dataset, found: list[Exponents | str], most: int) -> xr.Dataset:
+    runs = OnSweep(dataset)
+    exponents, errors = np.full((len(found), most), np.nan), np.full((len(found), most), np.nan)
+    single = np.full((len(found), 4), np.nan)
     for row, each in enumerate(found):
         if not isinstance(each, str):
-            table[row, : each.per_impact.size], errors[row, : each.per_impact.size] = (
-                each.per_impact,
-                each.standard_error,
-            )
+            count = each.per_impact.size
+            exponents[row, :count], errors[row, :count] = each.per_impact, each.standard_error
             single[row] = each.interval, each.dimension, each.impacts, each.sum_error
-    reasons = np.array([*(each if isinstance(each, str) else "" for each in found), "no run"], dtype=object)
-    rows: dict[str, Row] = {
-        "lyapunov_exponent": ((*dims, "exponent"), table[index], "1", "Lyapunov exponent per impact"),
-        "standard_error": ((*dims, "exponent"), errors[index], "1", "standard error of the exponent"),
-        "impact_interval": (dims, single[index, 0], time_unit, "mean time from impact to impact"),
-        "dimension": (
-            dims,
-            single[index, 1],
-            "1",
-            "Kaplan-Yorke dimension of the attractor of the impact map",
-        ),
-        "impacts": (dims, single[index, 2], "1", "impacts that counted"),
-        "sum_error": (
-            dims,
-            single[index, 3],
-            "1",
-            "sum of the exponents less its exact value, over their size",
-        ),
-        "reason": (dims, reasons[index], "1", "why a run has no exponents, else empty"),
+    interval, dimension, impacts, sum_error = np.moveaxis(runs.placed(single), -1, 0)
+    values = {
+        "lyapunov_exponent": runs.placed(exponents),
+        "standard_error": runs.placed(errors),
+        "impact_interval": interval,
+        "dimension": dimension,
+        "impacts": impacts,
+        "sum_error": sum_error,
+        "reason": runs.texts([each if isinstance(each, str) else "" for each in found]),
+        "exponent": np.arange(1, most + 1),
     }
-    coords = {
-        name: one.variable for name, one in dataset.coords.items() if one.dims and set(one.dims) <= set(dims)
-    }
-    for one in coords.values():
-        one.attrs.setdefault("units", "1")
-        one.attrs.setdefault("long_name", "swept")
-    numbers = xr.Variable(
-        "exponent", np.arange(1, most + 1), {"units": "1", "long_name": "exponent, the largest first"}
-    )
-    return xr.Dataset(described(rows), coords | {"exponent": numbers})
+    attrs = runs_attributes(dataset.attrs)
+    return TABLE.dataset(values, attrs, over=runs.dims, coords=runs.coords, units=units_of(dataset))

@@ -9,8 +9,8 @@ from typing import Any, Literal, cast
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import Row, described
-from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.dataset.results import ResultTable
+from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.grazing_sets import grazing_sets
 from vibroimpact.analysis.orbits.normal_forms import Nordmark, grazing_family, square_root_diagram
@@ -18,9 +18,9 @@ from vibroimpact.analysis.orbits.periodic import TURN
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import find_orbits
-from vibroimpact.orchestrator.orbits.follow import scene_attributes
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.parameters import float_parameters
+from vibroimpact.orchestrator.run.provenance import program_attributes, scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
@@ -33,6 +33,42 @@ MOST_POINTS = 100_000
 RHO, OFFSET = (-0.02, 0.1), (-0.01, 0.12)
 """Ranges of the diagrams, unless they are said."""
 CLASSES = {True: "stable", False: "unstable"}
+STATES = ResultTable(
+    "maps",
+    ("displacement", "state", "m", "displacement at forcing phase 0"),
+    ("velocity", "state", "m s-1", "velocity at forcing phase 0"),
+    ("orbit_displacement", "orbit", "m", "displacement"),
+    ("orbit_velocity", "orbit", "m s-1", "velocity"),
+    ("orbit_name", "orbit", "1", "orbit", "text"),
+)
+"""Variables of a strobe."""
+IMPACTS = ResultTable(
+    "maps",
+    ("phase", "state", "rad", "forcing phase of an impact"),
+    ("velocity", "state", "m s-1", "impact velocity"),
+    ("orbit_phase", "orbit", "rad", "phase"),
+    ("orbit_velocity", "orbit", "m s-1", "velocity"),
+    ("orbit_name", "orbit", "1", "orbit", "text"),
+    ("graze_phase", "graze", "rad", "forcing phase of a graze"),
+    ("before_phase", "graze", "rad", "S: forcing phase of the impact before the graze"),
+    ("before_velocity", "graze", "m s-1", "S: velocity of the impact before the graze"),
+    ("after_phase", "graze", "rad", "W: forcing phase of the impact after the graze"),
+    ("after_velocity", "graze", "m s-1", "W: velocity of the impact after the graze"),
+)
+"""Variables of an impact map; those of grazes are there with the kind `discontinuity`."""
+NORDMARK = ResultTable(
+    "maps",
+    ("rho", "rho", "1", "distance from the graze in Nordmark's map"),
+    ("x", "rho step", "1", "virtual penetration in Nordmark's map"),
+    ("forcing_amplitude", "rho", "N", "forcing amplitude"),
+)
+"""Variables of the diagram of Nordmark's map; the last is there with a scene."""
+SQUARE_ROOT = ResultTable(
+    "maps",
+    ("d", "d", "1", "offset of the square-root map"),
+    ("x", "d step", "1", "state of the square-root map"),
+)
+"""Variables of the diagram of the square-root map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +166,9 @@ def map_of(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
         found = _nordmark(scene, settings)
     else:
         found = _of_impacts(_needed(scene, settings), settings)
-    attributes = {} if scene is None else scene_attributes(scene, HISTORY) | {"units_system": scene.units}
+    attributes = program_attributes()
+    if scene is not None:
+        attributes |= scene_attributes(scene, HISTORY) | {"units_system": scene.units}
     return found.assign_attrs(attributes | {"map": settings.kind, "history": HISTORY})
 
 
@@ -145,59 +183,36 @@ def _needed(scene: Scene | None, settings: MapSettings) -> Scene:
 
 def _of_impacts(scene: Scene, settings: MapSettings) -> xr.Dataset:
     body = impacting_body(scene)
-    plain = scene.units == "nondimensional"
-    speed, metre, angle = ("1", "1", "1") if plain else ("m s-1", "m", "rad")
     try:
         orbits = find_orbits(scene, 1, 1)
     except OrbitError:  # a body without losses has families of them, of which none is marked
         orbits = []
-    if settings.kind == "strobe":
-        states = _run(scene, strobe=True)
-        rows = _pairs(
-            "state",
-            states,
-            (metre, "displacement at forcing phase 0"),
-            (speed, "velocity at forcing phase 0"),
-        )
+    is_strobe = settings.kind == "strobe"
+    states = _run(scene, strobe=is_strobe)
+    if is_strobe:
         marks = np.array([_strobed(orbit) for orbit in orbits]).reshape(-1, 2)
-        names = ("displacement", "velocity")
     else:
-        rows = _pairs(
-            "state",
-            _run(scene),
-            (angle, "forcing phase of an impact"),
-            (speed, "impact velocity"),
-            ("phase", "velocity"),
+        marks = np.array([(np.mod(orbit.phases[0], TURN), orbit.velocities[0]) for orbit in orbits]).reshape(
+            -1, 2
         )
-        marks = np.array([(orbit.phases[0], orbit.velocities[0]) for orbit in orbits]).reshape(-1, 2)
-        names = ("phase", "velocity")
-    units = [rows[names[0]][2], rows[names[1]][2]]
-    rows |= {
-        f"orbit_{names[0]}": (
-            "orbit",
-            np.mod(marks[:, 0], TURN) if names[0] == "phase" else marks[:, 0],
-            units[0],
-            names[0],
-        ),
-        f"orbit_{names[1]}": ("orbit", marks[:, 1], units[1], names[1]),
-        "orbit_name": ("orbit", np.array([_named(orbit) for orbit in orbits], dtype=object), "1", "orbit"),
+    across = "displacement" if is_strobe else "phase"
+    values = {
+        across: states[:, 0],
+        "velocity": states[:, 1],
+        f"orbit_{across}": marks[:, 0],
+        "orbit_velocity": marks[:, 1],
+        "orbit_name": [_named(orbit) for orbit in orbits],
     }
     if settings.kind == "discontinuity":
-        rows |= _sets(body, settings.points, angle, speed)
-    return xr.Dataset(described(rows))
-
-
-def _pairs(
-    dim: str,
-    table: Floats,
-    one: tuple[str, str],
-    other: tuple[str, str],
-    names: tuple[str, str] = ("displacement", "velocity"),
-) -> dict[str, Row]:
-    return {
-        name: (dim, table[:, column], unit, words)
-        for column, (name, (unit, words)) in enumerate(zip(names, (one, other), strict=True))
-    }
+        found = grazing_sets(body, settings.points)
+        values |= {
+            "graze_phase": found.grazes,
+            "before_phase": found.before_phase,
+            "before_velocity": found.before_velocity,
+            "after_phase": found.after_phase,
+            "after_velocity": found.after_velocity,
+        }
+    return (STATES if is_strobe else IMPACTS).dataset(values, units=scene.units)
 
 
 def _run(scene: Scene, *, strobe: bool = False) -> Floats:
@@ -232,27 +247,6 @@ def _named(orbit: PeriodicOrbit) -> str:
     return f"{'flip ' if multipliers[0].real < 0.0 else ''}saddle {orbit.name}"
 
 
-def _sets(body: ImpactingBody, points: int, angle: str, speed: str) -> dict[str, Row]:
-    found = grazing_sets(body, points)
-    return {
-        "graze_phase": ("graze", found.grazes, angle, "forcing phase of a graze"),
-        "before_phase": (
-            "graze",
-            found.before_phase,
-            angle,
-            "S: forcing phase of the impact before the graze",
-        ),
-        "before_velocity": (
-            "graze",
-            found.before_velocity,
-            speed,
-            "S: velocity of the impact before the graze",
-        ),
-        "after_phase": ("graze", found.after_phase, angle, "W: forcing phase of the impact after the graze"),
-        "after_velocity": ("graze", found.after_velocity, speed, "W: velocity of the impact after the graze"),
-    }
-
-
 # ---- of a graze ----
 
 
@@ -277,32 +271,20 @@ def _nordmark(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
     else:
         restitution = 1.0 if settings.restitution is None else settings.restitution
         chosen = Nordmark(settings.alpha, settings.gamma, restitution)
-    rows: dict[str, Row] = {
-        "rho": ("rho", rho, "1", "distance from the graze in Nordmark's map"),
-        "x": (("rho", "step"), chosen.diagram(rho), "1", "virtual penetration in Nordmark's map"),
-    }
+    values = {"rho": rho, "x": chosen.diagram(rho)}
     if family is not None:
-        plain = alone.units == "nondimensional"
-        rows["forcing_amplitude"] = (
-            "rho",
-            family.amplitude_of(rho),
-            "1" if plain else "N",
-            "forcing amplitude",
-        )
+        values["forcing_amplitude"] = family.amplitude_of(rho)
     attributes = {"alpha": chosen.alpha, "gamma": chosen.gamma, "restitution": chosen.restitution}
     if family is not None:
         attributes |= {"grazing_amplitude": family.amplitude, "rho_slope": family.slope}
     if chosen.oscillator is not None:
         ratio, frequency = chosen.oscillator
         attributes |= {"oscillator_damping_ratio": ratio, "oscillator_frequency_ratio": frequency}
-    return xr.Dataset(described(rows)).assign_attrs(attributes | {"root_sign": chosen.sign})
+    units = "SI" if scene is None else scene.units
+    return NORDMARK.dataset(values, attributes | {"root_sign": chosen.sign}, units=units)
 
 
 def _square_root(settings: MapSettings) -> xr.Dataset:
     slope = 0.5 if settings.slope is None else settings.slope
     offsets = np.linspace(*(settings.span or OFFSET), settings.points)
-    rows: dict[str, Row] = {
-        "d": ("d", offsets, "1", "offset of the square-root map"),
-        "x": (("d", "step"), square_root_diagram(slope, offsets), "1", "state of the square-root map"),
-    }
-    return xr.Dataset(described(rows)).assign_attrs(slope=slope)
+    return SQUARE_ROOT.dataset({"d": offsets, "x": square_root_diagram(slope, offsets)}, {"slope": slope})

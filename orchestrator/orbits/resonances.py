@@ -10,16 +10,35 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
-from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.energies import energies
-from vibroimpact.orchestrator.orbits.runs import scene_of
+from vibroimpact.orchestrator.orbits.runs import scene_of, units_of
+from vibroimpact.orchestrator.run.provenance import runs_attributes
 from vibroimpact.orchestrator.scene import Scene
 
+TABLE = ResultTable(
+    "resonances",
+    ("quantity", "peak", "1", "what has the peak", "text"),
+    ("peak_branch", "peak", "1", "index of its branch"),
+    ("peak_frequency", "peak", "rad s-1", "angular frequency of the peak"),
+    ("peak_height", "peak", "1", "height of the peak, in the unit of its quantity"),
+    ("grid_step", "peak", "rad s-1", "distance of the neighbours of the peak"),
+    ("motion", "peak", "1", "P(p,q) at the peak, or why there is no period", "text"),
+    ("stop_ratio", "peak", "1", "stop over deepest excursion on the other side, from the equilibrium"),
+    ("shifted_frequency", "peak mode", "rad s-1", "natural angular frequency, shifted by the stop"),
+    ("natural_frequency", "mode", "rad s-1", "natural angular frequency"),
+    ("displacement_range", "branch forcing", "m", "displacement range of the run"),
+    ("impact_velocity", "branch forcing", "m s-1", "impact velocity of the run"),
+    ("mean_kinetic_energy_#", "branch forcing", "J", "mean kinetic energy # of the run"),
+    ("branch", "branch", "1", "direction of the sweep", "text"),
+    ("forcing", "forcing", "rad s-1", "angular frequency of the force"),
+    ("mode", "mode", "1", "number of the mode, the slowest first"),
+)
 _KEYS = {"forcing.angular_frequency": 1.0, "forcing.frequency": 2.0 * np.pi}
 _SAME = 1e-9
 
@@ -90,58 +109,22 @@ def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     known = (ratio > -1.0) & (ratio <= 1.0 + _SAME)
     shifted[known] = frequency_shift(ratio[known])[:, None] * body.frequencies
     peaks = [each.peak for each in found]
-
-    def of_peak(values: object, unit: str, words: str) -> Row:
-        kind = object if isinstance(values, list) and isinstance(values[0], str) else None
-        return "peak", np.array(values, dtype=kind), unit, words
-
-    rows: dict[str, Row] = {
-        "quantity": of_peak([each.quantity for each in found], "1", "what has the peak"),
-        "peak_branch": of_peak([each.branch for each in found], "1", "index of its branch"),
-        "peak_frequency": of_peak(
-            [each.frequency for each in peaks], "rad s-1", "angular frequency of the peak"
-        ),
-        "peak_height": of_peak(
-            [each.height for each in peaks], "1", "height of the peak, in the unit of its quantity"
-        ),
-        "grid_step": of_peak(
-            [each.step for each in peaks], "rad s-1", "distance of the neighbours of the peak"
-        ),
-        "motion": of_peak(
-            [str(motion[each.branch, each.peak.place]) for each in found],
-            "1",
-            "P(p,q) at the peak, or why there is no period",
-        ),
-        "stop_ratio": of_peak(
-            ratio, "1", "stop over deepest excursion on the other side, from the equilibrium"
-        ),
-        "shifted_frequency": (
-            ("peak", "mode"),
-            shifted,
-            "rad s-1",
-            "natural angular frequency, shifted by the stop",
-        ),
-        "natural_frequency": ("mode", body.frequencies, "rad s-1", "natural angular frequency"),
+    values = {
+        "quantity": [each.quantity for each in found],
+        "peak_branch": [each.branch for each in found],
+        "peak_frequency": [each.frequency for each in peaks],
+        "peak_height": [each.height for each in peaks],
+        "grid_step": [each.step for each in peaks],
+        "motion": [str(motion[each.branch, each.peak.place]) for each in found],
+        "stop_ratio": ratio,
+        "shifted_frequency": shifted,
+        "natural_frequency": body.frequencies,
+        **curves,
+        "branch": branches,
+        "forcing": frequency,
+        "mode": np.arange(1, body.frequencies.size + 1),
     }
-    units = {"displacement_range": "m", "impact_velocity": "m s-1"}
-    for quantity, values in curves.items():
-        words = f"{quantity.replace('_', ' ')} of the run"
-        rows[quantity] = (("branch", "forcing"), values, units.get(quantity, "J"), words)
-    coords: dict[str, Row] = {
-        "branch": ("branch", np.array(branches, dtype=object), "1", "direction of the sweep"),
-        "forcing": ("forcing", frequency, "rad s-1", "angular frequency of the force"),
-        "mode": (
-            "mode",
-            np.arange(1, body.frequencies.size + 1),
-            "1",
-            "number of the mode, the slowest first",
-        ),
-    }
-    if dataset.attrs.get("units_system") == "nondimensional":
-        for each in (rows, coords):
-            each |= {key: (dims, values, "1", words) for key, (dims, values, _, words) in each.items()}
-    kept = {key: dataset.attrs[key] for key in ("title", "scene", "units_system") if key in dataset.attrs}
-    return xr.Dataset(described(rows), described(coords)).assign_attrs(kept)
+    return TABLE.dataset(values, runs_attributes(dataset.attrs), units=units_of(dataset))
 
 
 def _swept(dataset: xr.Dataset, scene: Scene) -> tuple[str, float]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset.schema import Outcome
-from vibroimpact.analysis.orbits.body import ImpactingBody
+from vibroimpact.analysis.dataset.schema import Outcome, UnitSystem
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.recorded import Impacts
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
@@ -48,6 +51,49 @@ def why_without_orbit(runs: xr.Dataset, place: int) -> str:
     if "impacts_per_period" in runs and np.isinf(runs["impacts_per_period"].values[place]).any():
         return "chatter: impacts without number"
     return ""
+
+
+def units_of(dataset: xr.Dataset) -> UnitSystem:
+    """Return the system of units of a dataset."""
+    return "nondimensional" if dataset.attrs.get("units_system") == "nondimensional" else "SI"
+
+
+class OnSweep:
+    """Places what belongs to runs on the dimensions of their dataset.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Dimensions of the runs.
+    coords : dict of str to xarray.Variable
+        Their coordinates, each with a unit and a name in words.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        run_id = dataset["run_id"].values
+        order = dataset.vibroimpact.runs["run_id"].values.tolist()
+        place = dict(zip(order, range(len(order)), strict=True))
+        self._index = np.array([place.get(int(number), -1) for number in run_id.ravel()]).reshape(
+            run_id.shape
+        )
+        self.dims = tuple(map(str, dataset["run_id"].dims))
+        self.coords = {
+            str(name): one.variable
+            for name, one in dataset.coords.items()
+            if one.dims and set(one.dims) <= set(self.dims)
+        }
+        for one in self.coords.values():
+            one.attrs.setdefault("units", "1")
+            one.attrs.setdefault("long_name", "swept")
+
+    def placed(self, values: Floats) -> Floats:
+        """Return numbers of runs, shape (run, ...), on the dimensions; NaN where there is no run."""
+        nothing = np.full((1, *values.shape[1:]), np.nan)
+        return np.asarray(np.concatenate([values, nothing])[self._index])
+
+    def texts(self, values: Sequence[str]) -> Any:
+        """Return texts of runs on the dimensions, a single one as it is; `no run` where there is none."""
+        return np.array([*values, "no run"], dtype=object)[self._index]
 
 
 class ImpactsOf:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import subprocess
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -24,9 +25,8 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "title": scene.title or Path(scene.source).stem,
         "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
         "scene": scene.text,
-        "versions": json.dumps(versions()),
+        **program_attributes(),
         "fmu_hashes": json.dumps(dict(identity.fmu_hashes), sort_keys=True),
-        "git_commit": git_commit(),
         "seed": _seed(scene),
         "execution": identity.execution,
         "engine": in_one_line(scene, identity.execution),
@@ -34,6 +34,28 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "instruction_set": identity.instruction_set,
         **scene.found,
     }
+
+
+def scene_attributes(scene: Scene, history: str) -> dict[str, Any]:
+    """Return the global attributes of what a study found of a scene."""
+    return {
+        "title": scene.title or Path(scene.source).stem,
+        "history": history,
+        "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
+        "scene": scene.text,
+        **program_attributes(),
+    }
+
+
+def runs_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the global attributes of what a study found of the runs of a dataset with these attributes."""
+    kept = {name: attrs[name] for name in ("title", "scene", "units_system") if name in attrs}
+    return kept | program_attributes()
+
+
+def program_attributes() -> dict[str, Any]:
+    """Return the global attributes that say which program made a dataset."""
+    return {"versions": json.dumps(versions()), "git_commit": git_commit()}
 
 
 def _seed(scene: Scene) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 import vibroimpact.orchestrator.study.clock as clock
-from vibroimpact.analysis.dataset.results import Rows, described
+from vibroimpact.analysis.dataset.results import SECONDS, ResultTable
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
+from vibroimpact.orchestrator.run.provenance import program_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.fields import rule_of
@@ -28,12 +27,13 @@ from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
 from vibroimpact.orchestrator.study.motion import (
     CHAOS,
+    OF_MOTIONS,
     REPLICATES,
     Motion,
     is_chaotic,
     motion_of,
     motions_in_words,
-    rows_of_motions,
+    values_of_motions,
 )
 from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.references import disturbed_scenes, observed, scales_of
@@ -48,6 +48,20 @@ RECORDED = ("impacts", "extrema", "strobe")
 SERIES = "record.time_series"
 NOT_RECORDED = "nothing but what is kept"
 NO_CHANGE = "nothing"
+TABLE = ResultTable(
+    "effects",
+    ("share", "effect", "1", "share of the time of a run, median"),
+    ("seconds", "effect pair", SECONDS, "processor time with the effect less that without, pair by pair"),
+    ("run_seconds", "effect", SECONDS, "median processor time of a run of the scene"),
+    ("change", "effect", "1", "largest relative change without it"),
+    *OF_MOTIONS,
+    ("name", "effect", "1", "effect", "text"),
+    ("asked_by", "effect", "1", "what asks for it", "text"),
+    ("changes", "effect", "1", "what is otherwise without it", "text"),
+    ("statistics", "effect", "1", "what is otherwise as a whole", "text"),
+    ("orbit", "effect", "1", "class of the motion", "text"),
+    ("orbit_without", "effect", "1", "class without it", "text"),
+)
 
 Change = Callable[[dict[str, Any]], None]
 
@@ -417,46 +431,26 @@ def not_called(scene: Scene) -> list[str]:
 def dataset_of_shares(
     scene: Scene, shares: Sequence[Share], attributes: Mapping[str, Any] | None = None
 ) -> xr.Dataset:
-    """Return what effects cost and change as a dataset, for `write_results` of kind `effects` and for figures."""
-    seconds = np.array([share.seconds for share in shares]).reshape(-1, PAIRS)
-    rows: Rows = {
-        "share": (
-            "effect",
-            [share.share for share in shares],
-            "1",
-            "share of the time of a run, median",
-        ),
-        "seconds": (
-            ("effect", "pair"),
-            seconds,
-            "s",
-            "processor time with the effect less that without, pair by pair",
-        ),
-        "run_seconds": (
-            "effect",
-            [share.full for share in shares],
-            "s",
-            "median processor time of a run of the scene",
-        ),
-        "change": ("effect", [share.change for share in shares], "1", "largest relative change without it"),
-    }
+    """Return what effects cost and change as a dataset of kind `effects`."""
     motions = [share.motions for share in shares]
-    as_a_whole = rows_of_motions(motions, [share.statistics for share in shares], scene.units)
-    dataset = xr.Dataset(described({**rows, **as_a_whole}))
-    for name, words, texts in (
-        ("name", "effect", [share.effect.name for share in shares]),
-        ("asked_by", "what asks for it", [share.effect.asked_by for share in shares]),
-        ("changes", "what is otherwise without it", [share.changes for share in shares]),
-        ("statistics", "what is otherwise as a whole", [share.statistics_in_words for share in shares]),
-        ("orbit", "class of the motion", [pair[0].orbit if pair else "" for pair in motions]),
-        ("orbit_without", "class without it", [pair[1].orbit if pair else "" for pair in motions]),
-    ):
-        dataset[name] = ("effect", np.array(texts, dtype=object), {"units": "1", "long_name": words})
-    return dataset.assign_attrs(
-        title=f"What effects cost: {scene.title or scene.source}",
-        not_simulated=", ".join(not_called(scene)),
-        scene=scene.text,
-        versions=json.dumps(versions()),
-        git_commit=git_commit(),
+    values = {
+        "share": [share.share for share in shares],
+        "seconds": np.array([share.seconds for share in shares]).reshape(-1, PAIRS),
+        "run_seconds": [share.full for share in shares],
+        "change": [share.change for share in shares],
+        **values_of_motions(motions, [share.statistics for share in shares]),
+        "name": [share.effect.name for share in shares],
+        "asked_by": [share.effect.asked_by for share in shares],
+        "changes": [share.changes for share in shares],
+        "statistics": [share.statistics_in_words for share in shares],
+        "orbit": [pair[0].orbit if pair else "" for pair in motions],
+        "orbit_without": [pair[1].orbit if pair else "" for pair in motions],
+    }
+    found = {
+        "title": f"What effects cost: {scene.title or scene.source}",
+        "not_simulated": ", ".join(not_called(scene)),
+        "scene": scene.text,
+        **program_attributes(),
         **(attributes or {}),
-    )
+    }
+    return TABLE.dataset(values, found, units=scene.units)

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.results import Row, Rows
-from vibroimpact.analysis.dataset.schema import UnitSystem, unit_in
+from vibroimpact.analysis.dataset.results import TableRow
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sampled_names import CONSERVATIVE
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
@@ -26,6 +25,30 @@ QUANTITIES = {
     "potential_energy": "J",
 }
 """What a motion is told by, with its SI unit; the last three are means over the recording."""
+OF_MOTIONS: tuple[TableRow, ...] = (
+    *(
+        (name, "effect motion", unit, f"{name.replace('_', ' ')}, with the effect and without it")
+        for name, unit in QUANTITIES.items()
+    ),
+    *(
+        (
+            f"{name}_sampling",
+            "effect",
+            "1",
+            f"change of the {name.replace('_', ' ')} by chance alone, relative",
+        )
+        for name in QUANTITIES
+    ),
+    ("impacts", "effect motion", "1", "impacts, with the effect and without it"),
+    (
+        "distribution_distance",
+        "effect",
+        "1",
+        "distance between the distributions of impact velocity, or of what is sampled, the largest",
+    ),
+    ("distribution_sampling", "effect", "1", "distance that chance alone makes"),
+)
+"""Rows of a table of results that say what motions are as a whole."""
 REPLICATES = 6
 """Runs from slightly different numbers, that tell chaos and the sampling error of its statistics."""
 SAMPLES_A_PERIOD, MOST_SAMPLES = 256, 2**16
@@ -180,43 +203,25 @@ def change_in_words(change: float, sampling: float) -> str:
     return f"{100.0 * change:+.3g} %{by_chance}"
 
 
-def rows_of_motions(
-    motions: Sequence[tuple[Motion, Motion] | None],
-    statistics: Sequence[Statistics | None],
-    system: UnitSystem,
-) -> Rows:
-    """Return the variables of a dataset of effects that say what motions are as a whole, with it and without it.
+def values_of_motions(
+    motions: Sequence[tuple[Motion, Motion] | None], statistics: Sequence[Statistics | None]
+) -> dict[str, Any]:
+    """Return the values of `OF_MOTIONS`: what motions are as a whole, with an effect and without it.
 
     Parameters
     ----------
     motions, statistics : sequence, shape (effect,)
-    system : {"SI", "nondimensional"}
     """
     none = Motion(dict.fromkeys(QUANTITIES, math.nan), -1, "")
     pairs = [pair or (none, none) for pair in motions]
-    rows: dict[str, Row] = {}
-    for name, unit in QUANTITIES.items():
-        words = name.replace("_", " ")
-        said = f"{words}, with the effect and without it"
-        values = [[one.of[name] for one in pair] for pair in pairs]
-        chance = [sampling_of_change(*pair)[name] for pair in pairs]
-        rows[name] = (("effect", "motion"), np.reshape(values, (-1, 2)), unit_in(system, unit), said)
-        rows[f"{name}_sampling"] = ("effect", chance, "1", f"change of the {words} by chance alone, relative")
-    counts = np.reshape([[one.impacts for one in pair] for pair in pairs], (-1, 2))
-    rows["impacts"] = (("effect", "motion"), counts, "1", "impacts, with the effect and without it")
     missing = Statistics(math.nan, math.nan, math.nan, math.nan)
     known = [one or missing for one in statistics]
-    return rows | {
-        "distribution_distance": (
-            "effect",
-            [one.distribution_distance for one in known],
-            "1",
-            "distance between the distributions of impact velocity, or of what is sampled, the largest",
-        ),
-        "distribution_sampling": (
-            "effect",
-            [one.distribution_sampling for one in known],
-            "1",
-            "distance that chance alone makes",
-        ),
+    values: dict[str, Any] = {}
+    for name in QUANTITIES:
+        values[name] = np.reshape([[one.of[name] for one in pair] for pair in pairs], (-1, 2))
+        values[f"{name}_sampling"] = [sampling_of_change(*pair)[name] for pair in pairs]
+    return values | {
+        "impacts": np.reshape([[one.impacts for one in pair] for pair in pairs], (-1, 2)),
+        "distribution_distance": [one.distribution_distance for one in known],
+        "distribution_sampling": [one.distribution_sampling for one in known],
     }
