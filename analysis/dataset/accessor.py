@@ -1,16 +1,26 @@
-"""`ds.vibroimpact`: the impacts, sticks, samples and events of one run, under the dataset's coordinates."""
+"""What `ds.vibroimpact` is: the impacts, sticks, samples and events of one run, under the dataset's coordinates."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.schema import RAGGED, Direction, constant_names, names_list
+from vibroimpact.analysis.dataset.schema import (
+    RAGGED,
+    Direction,
+    Outcome,
+    constant_names,
+    names_list,
+    swept_names,
+)
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.html_view import html_table
+from vibroimpact.fmus.printable import printable
 
 _RECORD_KEYS = {
     "impact": "impacts = true",
@@ -23,7 +33,6 @@ _RECORD_KEYS = {
 _SAME = 1e-6
 
 
-@xr.register_dataset_accessor("vibroimpact")
 class VibroimpactAccessor:
     """What an opened dataset can be asked about its runs.
 
@@ -39,7 +48,7 @@ class VibroimpactAccessor:
     def runs(self) -> xr.Dataset:
         """The per-run variables along one dimension `run`, in file order, with the sweep as coordinates."""
         dataset = self._dataset
-        run_id = _run_id(dataset)
+        run_id = run_ids(dataset)
         kept = dataset.drop_vars([name for name, v in dataset.variables.items() if set(v.dims) & set(RAGGED)])
         if run_id.dims == ("run",):
             return kept
@@ -51,6 +60,58 @@ class VibroimpactAccessor:
         flat = flat.isel(run=flat["run_id"].values >= 0)
         flat = flat.isel(run=np.argsort(flat["run_id"].values))
         return flat.transpose("run", ...)
+
+    def __repr__(self) -> str:
+        facts = "; ".join(f"{name}: {value}" for name, value in self._facts())
+        return printable(f"<vibroimpact: {facts}>")
+
+    def _repr_html_(self) -> str:
+        return html_table("vibroimpact", (), self._facts())
+
+    def _facts(self) -> list[tuple[str, object]]:
+        """Return what the dataset holds: names and values."""
+        dataset, run_id = self._dataset, run_ids(self._dataset)
+        outcomes = Counter(np.asarray(dataset["outcome"].values)[run_id.values >= 0].tolist())
+        ends = ", ".join(f"{count} {Outcome(kind).name}" for kind, count in sorted(outcomes.items()))
+        facts: list[tuple[str, object]] = [
+            ("title", dataset.attrs.get("title", "none")),
+            ("runs", f"{int((run_id.values >= 0).sum())} ({ends or 'none'})"),
+        ]
+        facts += [(name, _swept_in_words(dataset[name])) for name in swept_names(dataset)]
+        return facts + [(f"{dim}s", dataset.sizes[dim]) for dim in _RECORD_KEYS if dim in dataset.dims]
+
+    def impacts_table(self) -> xr.Dataset:
+        """Return the impacts of all runs along `impact`, each with the parameters of its run.
+
+        Returns
+        -------
+        xarray.Dataset
+            Columns as those of `impacts`; `run_id`, `run_index`, `direction` and the swept parameters are coordinates
+            along `impact`. `to_dataframe()` makes it a table of pandas.
+
+        Raises
+        ------
+        DatasetError
+            If impacts were not recorded.
+
+        Examples
+        --------
+        >>> table = ds.vibroimpact.impacts_table()                                  # doctest: +SKIP
+        >>> table.plot.scatter("angular_frequency", "impact_velocity")              # doctest: +SKIP
+        """
+        dataset = self._dataset
+        table = dataset[_rows_of(dataset, "impact")]
+        run_id = run_ids(dataset)
+        place = np.empty(run_id.size, dtype=np.intp)
+        is_there = run_id.values.ravel() >= 0
+        place[run_id.values.ravel()[is_there]] = np.flatnonzero(is_there)
+        rows = place[_owners(dataset, "impact")]
+        points = {}
+        for name, values in _coordinates(dataset, run_id).items():
+            attrs = dataset[name].attrs if name in dataset.variables else {}
+            if name not in constant_names(dataset):
+                points[name] = ("impact", values[rows], attrs)
+        return table.drop_vars([name for name in table.coords if name not in points]).assign_coords(points)
 
     def impacts(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
         """Return the impacts of one run along `impact`.
@@ -95,23 +156,40 @@ class VibroimpactAccessor:
     def _rows(self, dimension: str, exact: bool, selection: dict[str, Any]) -> xr.Dataset:
         """Return the rows of one run of a ragged array, with the run's coordinates as scalars."""
         dataset = self._dataset
-        if dimension not in dataset.dims:
-            raise DatasetError(
-                f"{dimension}s: expected them in the dataset, got none recorded. "
-                f"Set {_RECORD_KEYS[dimension]} under [record] in the scene and run it again."
-            )
+        names = _rows_of(dataset, dimension)
         number, point = _the_run(dataset, exact, selection)
         rows = np.flatnonzero(_owners(dataset, dimension) == number)
-        names = [
-            name
-            for name, v in dataset.variables.items()
-            if v.dims == (dimension,) and name != f"{dimension}_run"
-        ]
         found = dataset[names].drop_vars([c for c in dataset[names].coords if c not in names])
         return found.isel({dimension: rows}).assign_coords(point)
 
 
-def _run_id(dataset: xr.Dataset) -> xr.DataArray:
+def _rows_of(dataset: xr.Dataset, dimension: str) -> list[Any]:
+    """Return the names of the columns of a ragged array.
+
+    Raises
+    ------
+    DatasetError
+        It was not recorded.
+    """
+    if dimension not in dataset.dims:
+        raise DatasetError(
+            f"{dimension}s: expected them in the dataset, got none recorded. "
+            f"Set {_RECORD_KEYS[dimension]} under [record] in the scene and run it again."
+        )
+    return [
+        name for name, v in dataset.variables.items() if v.dims == (dimension,) and name != f"{dimension}_run"
+    ]
+
+
+def _swept_in_words(values: xr.DataArray) -> str:
+    """Return the range of a swept parameter, its unit and how many values it has."""
+    unit = str(values.attrs.get("units", "1"))
+    there = np.unique(values.values)
+    span = f"{there[0]:g} to {there[-1]:g}" if there.size > 1 else ", ".join(f"{each:g}" for each in there)
+    return f"{span}{'' if unit == '1' else f' {unit}'}, {there.size} values"
+
+
+def run_ids(dataset: xr.Dataset) -> xr.DataArray:
     """Return the run_id of each point; in a dataset that is still one-dimensional the runs are in order."""
     if "run_id" in dataset.variables:
         return dataset["run_id"]
@@ -127,7 +205,7 @@ def _owners(dataset: xr.Dataset, dimension: str) -> NDArray[Any]:
 
 def _the_run(dataset: xr.Dataset, exact: bool, selection: dict[str, Any]) -> tuple[int, dict[str, Any]]:
     """Return the run_id of the one run that a selection names, and its coordinates."""
-    run_id = _run_id(dataset)
+    run_id = run_ids(dataset)
     columns = _coordinates(dataset, run_id)
     unknown = [name for name in selection if name not in columns]
     if unknown:

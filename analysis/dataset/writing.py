@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.assembling import Described, assembled, loaded_variable, wrapped
+from vibroimpact.analysis.dataset.backend import VibroimpactBackend  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.columns import (
     OF_ALL_PERIODS,

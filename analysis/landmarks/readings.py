@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
+from vibroimpact.analysis.dataset.backend import VibroimpactBackend  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.landmarks.exact import (
     ImpactOscillator,

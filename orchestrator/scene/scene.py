@@ -50,17 +50,18 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Sensor,
     channels_in,
 )
-from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, Stop
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.resting_start import with_resting_start
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 from vibroimpact.orchestrator.scene.tables import read_tables
+from vibroimpact.orchestrator.scene.views import ViewedScene
 
 __all__ = ["Scene", "load_scene", "parse_scene"]
 
 
-class Scene(SceneTable):
+class Scene(ViewedScene):
     """A validated scene; it never changes, `with_values` and `with_sweep` make another.
 
     Attributes
