@@ -10,9 +10,9 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset, write_dataset
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.following import FollowSettings
+from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
 from vibroimpact.orchestrator.orbits.basins import (
@@ -38,7 +38,7 @@ def find_orbits(
     *,
     seed: Sequence[tuple[float, int]] | None = None,
     penetrating: bool = False,
-) -> list[PeriodicOrbit]:
+) -> FoundOrbits:
     """Find periodic orbits of a scene, stable and unstable ones.
 
     Parameters
@@ -55,7 +55,8 @@ def find_orbits(
     Returns
     -------
     list of PeriodicOrbit
-        With `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable`, `highest` maximum between impacts.
+        With `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable`, `highest` maximum between impacts. `draw`
+        draws the list, and its `dataset` has each physical orbit as a run.
 
     Raises
     ------

@@ -23,6 +23,8 @@ from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label,
 from vibroimpact.analysis.figures.study.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.sweep.diagrams import largest_impact_velocity
 from vibroimpact.analysis.figures.window import View, Window
+from vibroimpact.analysis.orbits.classify import ClassesOfRuns
+from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
 
@@ -42,7 +44,7 @@ __all__ = [
 
 
 def draw(
-    data: xr.Dataset | Recording,
+    data: xr.Dataset | Recording | FoundOrbits | ClassesOfRuns,
     kind: str = "auto",
     run: int | None = None,
     *,
@@ -61,9 +63,9 @@ def draw(
 
     Parameters
     ----------
-    data : xarray.Dataset or Recording
+    data : xarray.Dataset, Recording, or list of orbits or classes
         As `open_dataset` gives a dataset, `open_measured` what an analysis found or a benchmark measured,
-        `open_recording` a recording.
+        `open_recording` a recording, `find_orbits` orbits, `classify` classes; what any function of `vi` returns.
     kind : str
         `auto`, or one of `KINDS`. Auto draws of a dataset of runs a single run where nothing is swept or a run is
         named, else a bifurcation diagram, or colour maps over two swept parameters; of a campaign of replays its
@@ -114,7 +116,7 @@ T = TypeVar("T", bound=Axes | Sequence[Axes] | npt.NDArray[Any])
 
 def draw_into(
     axes: T,
-    data: xr.Dataset | Recording,
+    data: xr.Dataset | Recording | FoundOrbits | ClassesOfRuns,
     kind: str = "auto",
     run: int | None = None,
     *,

@@ -5,15 +5,17 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.window import View
 
+FIRST = ("runs", "recordings")
+"""Modules whose families are listed first: those of what is no result of an analysis."""
 ROOMS = ("motion", "sweep", "measured", "study", "orbits")
-"""Rooms whose modules register families, in the order in which kinds of figures are listed."""
+"""Rooms of modules that draw, in the order in which kinds of figures are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,23 +48,26 @@ class Family:
     words : str
         What messages call such data.
     drawings : mapping of str to Drawing
-        By the kind of figure; the first is the usual one.
-    usual : callable, optional
-        The usual kind of figure of data in a view, where it depends on them.
+        By the kind of figure.
+    usual : str or callable
+        The kind of figure that says most, or returns it of data in a view; by default the first.
     type : type, optional
         Objects that are of this family, where it is none of results.
+    is_of_results : bool
+        Whether the attribute `results_kind` of a dataset names this family.
     """
 
     name: str
     words: str
     drawings: Mapping[str, Drawing]
-    usual: Callable[[Any, View], str] | None = None
+    usual: str | Callable[[Any, View], str] = ""
     type: type | None = None
-    is_of_results: bool = field(default=True, kw_only=True)
+    is_of_results: bool = True
 
     def usual_kind(self, data: Any, view: View) -> str:
         """Return the kind of figure that says most of data."""
-        return next(iter(self.drawings)) if self.usual is None else self.usual(data, view)
+        usual = self.usual or next(iter(self.drawings))
+        return usual if isinstance(usual, str) else usual(data, view)
 
     def fitting(self, data: Any) -> list[str]:
         """Return the kinds of figures that fit data of this family."""
@@ -86,9 +91,21 @@ def register(family: Family) -> None:
     FAMILIES[family.name] = family
 
 
+def register_results(name: str, words: str, draw: Callable[[Any], Figure], kind: str = "") -> None:
+    """Take up results with one kind of figure, which has their name unless it is said, and no options."""
+    register(Family(name, words, {kind or name: Drawing(whole(draw))}))
+
+
+def whole(draw: Callable[[Any], Figure]) -> Callable[[Any, View], Figure]:
+    """Return what draws data whatever the view is."""
+    return lambda data, view: draw(data)
+
+
 def load_families() -> None:
     """Import every module that draws: each registers its families."""
     package = __name__.rpartition(".")[0]
+    for name in FIRST:
+        importlib.import_module(f"{package}.{name}")
     for room in ROOMS:
         folder = importlib.import_module(f"{package}.{room}")
         for module in pkgutil.iter_modules(folder.__path__):

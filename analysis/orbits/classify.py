@@ -8,16 +8,20 @@ by a constant factor, those of a doubled period do not.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.accessor import run_ids
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.html_view import html_table
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +37,8 @@ GROWTH, AHEAD = 0.05, 6
 """Rate, 1 / period, at which neighbouring states part in chaos; periods that are looked ahead."""
 FALLS = 5.0
 """Fall of the distance of two rounds over a run, over what a round changes by, from which they may be one."""
+_MOST_SHOWN = 6
+"""Classes that are listed in one line."""
 _STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
 
 
@@ -62,7 +68,44 @@ class RunClass:
         return str(self.kind.name).replace("_", " ")
 
 
-def classify(dataset: xr.Dataset) -> list[RunClass]:
+class ClassesOfRuns(list[RunClass]):
+    """The classes of the runs of a dataset, in the order of its file.
+
+    Parameters
+    ----------
+    classes : iterable of RunClass
+    runs : xarray.Dataset
+        The dataset that was classified.
+    """
+
+    def __init__(self, classes: Iterable[RunClass], runs: xr.Dataset) -> None:
+        super().__init__(classes)
+        self._runs = runs
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The dataset that was classified, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`."""
+        units: UnitSystem = self._runs.attrs.get("units_system", "SI")
+        run_id = run_ids(self._runs)
+        columns = {}
+        for name, values in _columns(self).items():
+            missing = np.array(["" if values.dtype == object else -1], dtype=values.dtype)
+            placed = np.asarray(np.concatenate([values, missing])[run_id.values])
+            columns[name] = (run_id.dims, placed, attributes_of(name, units))
+        return self._runs.assign(columns)
+
+    def __repr__(self) -> str:
+        counts = Counter(each.name for each in self).most_common(_MOST_SHOWN + 1)
+        told = [f"{count} {name}" for name, count in counts[:_MOST_SHOWN]]
+        return f"<classes of {len(self)} runs: {', '.join(told + ['...'] * (len(counts) > _MOST_SHOWN))}>"
+
+    def _repr_html_(self) -> str:
+        counts = Counter((each.name, each.reason) for each in self).most_common()
+        rows = [(name, count, reason) for (name, reason), count in counts]
+        return html_table(f"Classes of {len(self)} runs", ("class", "runs", "why"), rows)
+
+
+def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     """Return the class of each run, in the order of the file.
 
     Parameters
@@ -70,6 +113,11 @@ def classify(dataset: xr.Dataset) -> list[RunClass]:
     dataset : xarray.Dataset
         As `open_dataset` gives it. It needs the strobe or the extrema of each recorded period, and impacts, or their
         number in each period; without the latter a motion may be periodic, but impacts are not told.
+
+    Returns
+    -------
+    list of RunClass
+        With `dataset`: the same runs, in the shape of their sweep, and their classes, as `draw` draws them.
 
     Raises
     ------
@@ -89,15 +137,16 @@ def classify(dataset: xr.Dataset) -> list[RunClass]:
     counts = runs["impacts_per_period"].values if "impacts_per_period" in runs.variables else None
     sticks = runs["stick_count"].values if "stick_count" in runs.variables else np.zeros(len(states))
     outcomes = runs["outcome"].values
-    return [
+    found = (
         class_of(
             states[run],
             None if counts is None else counts[run],
             Outcome(int(outcomes[run])),
             bool(sticks[run] > 0),
         )
-        for run, own in enumerate(states)
-    ]
+        for run in range(len(states))
+    )
+    return ClassesOfRuns(found, dataset)
 
 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
@@ -111,18 +160,19 @@ def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSyste
         In the order of its runs.
     units : {"SI", "nondimensional"}
     """
+    columns = _columns(classes).items()
+    return flat.assign({name: ("run", values, attributes_of(name, units)) for name, values in columns})
+
+
+def _columns(classes: Sequence[RunClass]) -> dict[str, NDArray[Any]]:
+    """Return the variables of classes, run by run."""
     columns = {
         "class_kind": [each.kind for each in classes],
         "class_impacts": [each.impacts for each in classes],
         "class_periods": [each.periods for each in classes],
         "class_reason": [each.reason for each in classes],
     }
-    return flat.assign(
-        {
-            name: ("run", np.array(values, dtype=RULES[name].dtype), attributes_of(name, units))
-            for name, values in columns.items()
-        }
-    )
+    return {name: np.array(values, dtype=RULES[name].dtype) for name, values in columns.items()}
 
 
 def class_of(

@@ -22,6 +22,8 @@ CLOSE = 32.0 * np.finfo(float).eps
 """Distance from the stops at the impacts, over the size of the motion, of an orbit that is found."""
 SAME = 1e-7
 """Phases, rad, that are one."""
+_MOST_SHOWN = 4
+"""Impacts that are listed in one line."""
 TOUCHES = 1e-12
 """Distance beyond a stop, over the size of the motion, that counts as a touch."""
 
@@ -30,7 +32,7 @@ class OrbitError(VibroimpactError):
     """An orbit was not found, or not followed further."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PeriodicOrbit:
     """An orbit of a body, P(p,q): p impacts in q periods of the force.
 
@@ -57,6 +59,18 @@ class PeriodicOrbit:
     def name(self) -> str:
         """P(p,q)."""
         return f"P({self.phases.size},{self.periods})"
+
+    def __repr__(self) -> str:
+        phases, speeds = (
+            ", ".join(f"{each:.6g}" for each in column[:_MOST_SHOWN]) + ", ..." * (column.size > _MOST_SHOWN)
+            for column in (self.phases, self.velocities)
+        )
+        return f"<{self.full_name}, {self.stability}: phases {phases}; velocities {speeds}>"
+
+    @property
+    def stability(self) -> str:
+        """`stable` or `unstable`."""
+        return "stable" if self.is_stable else "unstable"
 
     @property
     def full_name(self) -> str:

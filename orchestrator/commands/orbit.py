@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +9,14 @@ import numpy as np
 from vibroimpact.analysis.dataset import write_dataset
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.orbits import PeriodicOrbit
-from vibroimpact.analysis.orbits.branches import dataset_of_orbits
+from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.commands.beginning import begun, files_of, is_seed, refuse_contradictions
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.operations.orbit import FindOrbits
-from vibroimpact.orchestrator.orbits.find import find_orbits
-from vibroimpact.orchestrator.run.provenance import scene_attributes
-from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.orbits.find import HISTORY, find_orbits
 from vibroimpact.orchestrator.ssp import opened_scene
-
-HISTORY = "periodic orbits found by vibroimpact"
 
 
 def show_orbits(options: FindOrbits) -> None:
@@ -50,13 +45,12 @@ def show_orbits(options: FindOrbits) -> None:
         if physical
         else f"No physical orbit {_called(options)}."
     )
-    _write(scene, physical, output)
+    _write(orbits, output)
     if figure is not None and orbits:
         from vibroimpact.analysis import figures  # half a second, which a table needs not
-        from vibroimpact.analysis.figures.orbits.portrait import draw_orbits
 
         with writing(figure):
-            figures.save(draw_orbits(orbits, scene.units), figure)
+            figures.save(figures.draw(orbits), figure)
         say(f"Figure written to {figure}.")
 
 
@@ -69,14 +63,13 @@ def _called(options: FindOrbits) -> str:
     return f"P({options.impacts or 1},{options.periods or 1})"
 
 
-def _write(scene: Scene, physical: Sequence[PeriodicOrbit], output: Path | None) -> None:
+def _write(orbits: FoundOrbits, output: Path | None) -> None:
     if output is None:
         return
-    if not physical:
+    if not any(orbit.is_physical for orbit in orbits):
         say(f"{output} is not written: it would hold no orbit.")
         return
-    attrs = scene_attributes(scene.unswept(), HISTORY)
-    write_dataset(dataset_of_orbits(physical, units=scene.units, attrs=attrs), output)
+    write_dataset(orbits.dataset, output)
     say(f"Dataset written to {output}.")
 
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
+from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.search import orbits_of, same_orbit
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 
+HISTORY = "periodic orbits found by vibroimpact"
 LONGEST = 16
 """Forcing periods of an orbit that a run is taken to end on."""
 TRANSIENT = 2000
@@ -29,7 +34,7 @@ def find_orbits(
     *,
     seed: Seed | None = None,
     penetrating: bool = False,
-) -> list[PeriodicOrbit]:
+) -> FoundOrbits:
     """Return periodic orbits of a scene, stable and unstable.
 
     Parameters
@@ -52,6 +57,13 @@ def find_orbits(
         There is no orbit near to the seed.
     """
     alone = scene.unswept()
+    orbits = _found(alone, impacts, periods, seed, penetrating)
+    return FoundOrbits(orbits, alone.units, partial(scene_attributes, alone, HISTORY))
+
+
+def _found(
+    alone: Scene, impacts: int | None, periods: int | None, seed: Seed | None, penetrating: bool
+) -> list[PeriodicOrbit]:
     body = impacting_body(alone)
     if seed is not None:
         return [_of_seed(body, seed, impacts, 1 if periods is None else periods)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
@@ -183,10 +184,9 @@ def _needed(scene: Scene | None, settings: MapSettings) -> Scene:
 
 def _of_impacts(scene: Scene, settings: MapSettings) -> xr.Dataset:
     body = impacting_body(scene)
-    try:
-        orbits = find_orbits(scene, 1, 1)
-    except OrbitError:  # a body without losses has families of them, of which none is marked
-        orbits = []
+    orbits: list[PeriodicOrbit] = []
+    with suppress(OrbitError):  # a body without losses has families of them, of which none is marked
+        orbits += find_orbits(scene, 1, 1)
     is_strobe = settings.kind == "strobe"
     states = _run(scene, strobe=is_strobe)
     if is_strobe:

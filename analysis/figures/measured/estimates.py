@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.measured.impact_estimate import draw_impact_estimate, limit
 from vibroimpact.analysis.figures.page import LINE, MARK, STOP, canvas, legend_above, page_style, unit_symbol
 from vibroimpact.fmus.errors import DatasetError
@@ -171,3 +172,6 @@ def _draw_response(dataset: xr.Dataset) -> Figure:
         axes[1].set(ylim=(0.0, 1.05), ylabel="coherence (-)")
     axes[-1].set(xlim=(float(hertz[0]), float(hertz[-1])), xlabel="frequency (Hz)")
     return figure
+
+
+register_results("estimates", "estimates", draw_estimates)

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, canvas, legend_above, page_style
 
 _HEIGHT_MM, _WIDE = 120, 2 * COLUMN_WIDTH
@@ -137,3 +138,6 @@ def _name_embedding(axis: Axes, radii: np.ndarray, slopes: np.ndarray, embedding
             ha="center",
             va="center",
         )
+
+
+register_results("spikes", "spikes", draw_intervals, "intervals")

@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
 from vibroimpact.analysis.figures.sweep.diagrams import edges
 
@@ -56,3 +57,6 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     )
     legend_outside(figure, axis, ncols=2)
     return figure
+
+
+register_results("basins", "basins of attraction", draw_basins)

@@ -26,6 +26,7 @@ _LONG = 20
 """Letters of an entry of the legend, of which no three fit beside each other."""
 _STABLE: dict[str, Any] = {"color": "#0F4C81", "linewidth": 0.9, "linestyle": "-"}
 _UNSTABLE: dict[str, Any] = {"color": "#B5410B", "linewidth": 0.8, "linestyle": (0, (3, 1.5))}
+_ALONE: dict[str, Any] = {"marker": "o", "markersize": 3.4}
 _BELOW: dict[str, Any] = {
     "marker": "o",
     "markersize": 1.4,
@@ -170,7 +171,8 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
             # a piece goes to the neighbours on either side, so that no gap is left where stability changes
             keep = which[chosen] | np.append(which[chosen][1:], False) & ~which[chosen]
             shown = np.where(keep[:, None], values, np.nan)
-            lines = axis.plot(places[chosen], shown, **style)
+            # an orbit that was not followed is no line
+            lines = axis.plot(places[chosen], shown, **style, **({} if chosen.size > 1 else _ALONE))
             if words not in said and keep.any():
                 lines[0].set_label(words)
                 said.add(words)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import Drawing, Family, register
 from vibroimpact.analysis.figures.orbits.branches import draw_below
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
 from vibroimpact.analysis.figures.sweep.diagrams import varied, wrong_sweep
@@ -62,3 +63,12 @@ def draw_control(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure:
     pushes.set_xlim(low - room, high + room)
     legend_outside(figure, speeds, ncols=2)
     return figure
+
+
+register(
+    Family(
+        "control",
+        "an orbit that was kept",
+        {"control": Drawing(lambda data, view: draw_control(data, view.over), takes=("over",))},
+    )
+)

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside, unit_symbol
 
 _DOTS: dict[str, Any] = {"marker": "o", "linestyle": "none", "markeredgewidth": 0.0, "color": "#0F4C81"}
@@ -103,3 +104,6 @@ def _draw_diagram(axis: Axes, dataset: xr.Dataset) -> None:
             ),
         )
         below.set_xlabel(label(dataset["forcing_amplitude"]))
+
+
+register_results("maps", "a map", draw_maps)

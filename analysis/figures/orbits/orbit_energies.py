@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import (
     COLOURS,
     LINE,
@@ -130,3 +131,6 @@ def _draw_plane(axis: Axes, dataset: xr.Dataset) -> None:
     axis.set_xlabel(f"energy that impacts meet ({unit})")
     axis.set_title("restitution", fontsize=6, loc="right", pad=2)
     axis.set_ylabel(f"residual energy ({unit})")
+
+
+register_results("energies", "energies of orbits", draw_orbit_energies)

@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import (
     COLOURS,
     MARK,
@@ -79,3 +80,6 @@ def _draw_natural(axis: Axes, dataset: xr.Dataset) -> None:
         if moved <= dataset["forcing"].values.max():
             axis.axvline(moved, color=COLOURS[number % len(COLOURS)], linestyle="--", linewidth=0.6, zorder=0,
                          label="shifted")  # fmt: skip
+
+
+register_results("resonances", "resonances", draw_resonances)

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
 from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 
@@ -192,3 +193,6 @@ def _explain_failures(axis: Axes, dataset: xr.Dataset) -> None:
     if (dataset["failure"].values != "").any():
         label = "no error: impacts missed, or no end"
         axis.plot([], [], "x", color="0.4", markersize=5.0, linestyle="none", label=label)
+
+
+register_results("accuracy", "a study of accuracy", draw_accuracy)

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import LINE, MARK, canvas, page_style
 from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 
@@ -119,3 +120,6 @@ def _draw_convergence(axis: Axes, dataset: xr.Dataset) -> None:
     axis.set_xlabel("number of modes")
     axis.set_ylabel("relative error (-)")
     axis.legend(fontsize=6, frameon=False)
+
+
+register_results("effects", "a study of effects", draw_effects)

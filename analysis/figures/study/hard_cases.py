@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, canvas, page_style
 from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 
@@ -86,3 +87,6 @@ def _draw_case(axis: Axes, case: xr.Dataset) -> None:
     axis.set_xlabel(str(case["x_label"].item()), fontsize=6)
     axis.set_ylabel(str(case["y_label"].item()), fontsize=5)
     axis.tick_params(labelsize=5)
+
+
+register_results("hard_cases", "hard cases", draw_hard_cases, "hard-cases")

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.figures.families import Drawing, Family, register, whole
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label, legend_above, page_style
 from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 from vibroimpact.analysis.landmarks import observed_order
@@ -197,3 +198,16 @@ def _entry(exchange: str, order: float) -> str:
 def _way(name: str) -> str:
     """Return an exchange, or another way to compute, in words."""
     return _WORDS.get(name, name.replace("_", " "))
+
+
+register(
+    Family(
+        "ladder",
+        "what a benchmark measured",
+        {
+            "convergence": Drawing(whole(convergence)),
+            "work-precision": Drawing(whole(work_precision)),
+        },
+        is_of_results=False,
+    )
+)

@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import Drawing, Family, register
 from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, canvas, label, legend_outside, page_style
 from vibroimpact.analysis.figures.sweep.diagrams import is_logarithmic
 from vibroimpact.fmus.errors import DatasetError
@@ -91,3 +92,12 @@ def _draw_lines(axis: Axes, own: xr.Dataset, along: str) -> None:
         axis.set_xscale("log")
     axis.set_ylabel("total index (-)")
     axis.set_ylim(bottom=0.0)
+
+
+register(
+    Family(
+        "sensitivity",
+        "a study of sensitivity",
+        {"sensitivity": Drawing(lambda data, view: draw_sensitivity(data))},
+    )
+)

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.figures.families import FAMILIES
 from vibroimpact.analysis.figures.kinds import fitting
 from vibroimpact.analysis.figures.measured.intervals import draw_intervals
 from vibroimpact.analysis.intervals import interval_report
@@ -372,7 +373,7 @@ def test_kinds_that_fit_are_those_that_can_be_drawn(tmp_path: Path) -> None:
         tmp_path,
     )
     for kind in fitting(sweep):
-        takes_run = "run" in figures.KINDS[kind].takes
+        takes_run = "run" in FAMILIES["runs"].drawings[kind].takes
         assert figures.draw(sweep, kind, run=3 if takes_run else None).axes
     assert fitting(sweep) == [
         "bifurcation",

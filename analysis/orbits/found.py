@@ -1,0 +1,67 @@
+"""Orbits of a body that were found, as a list that has a dataset and can be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset.schema import UnitSystem
+from vibroimpact.analysis.orbits.branches import dataset_of_orbits
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.html_view import html_table
+
+
+class FoundOrbits(list[PeriodicOrbit]):
+    """Periodic orbits of one body.
+
+    Parameters
+    ----------
+    orbits : iterable of PeriodicOrbit
+    units : {"SI", "nondimensional"}
+    attributes : callable
+        Returns the attributes of their dataset.
+
+    Attributes
+    ----------
+    units : {"SI", "nondimensional"}
+    """
+
+    def __init__(
+        self, orbits: Iterable[PeriodicOrbit], units: UnitSystem, attributes: Callable[[], Mapping[str, Any]]
+    ) -> None:
+        super().__init__(orbits)
+        self.units = units
+        self._attributes = attributes
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The physical orbits along `run`, each a branch of its own, with their forcing frequency.
+
+        Raises
+        ------
+        DatasetError
+            There is no physical orbit among them.
+        """
+        physical = [orbit for orbit in self if orbit.is_physical]
+        if not physical:
+            raise DatasetError("orbits: expected one that is nowhere beyond a stop, got none.")
+        return dataset_of_orbits(physical, units=self.units, attrs=self._attributes())
+
+    def _repr_html_(self) -> str:
+        headings = ("orbit", "", "phases, rad", "stops", "impact velocities", "largest multiplier")
+        return html_table("Periodic orbits", headings, [_told(orbit) for orbit in self])
+
+
+def _told(orbit: PeriodicOrbit) -> tuple[object, ...]:
+    largest = orbit.multipliers[0]
+    return (
+        orbit.name,
+        orbit.stability,
+        ", ".join(f"{phase:.6g}" for phase in orbit.phases),
+        ", ".join(str(contact + 1) for contact in orbit.contacts),
+        ", ".join(f"{speed:.6g}" for speed in orbit.velocities),
+        f"{largest:.6g}" if largest.imag else f"{largest.real:.6g}",
+    )

@@ -1,0 +1,150 @@
+"""Whatever the door returns, `vi.draw` draws: datasets of each kind, lists of orbits and of classes."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+from support.command_line import in_this_process
+
+import vibroimpact as vi
+from vibroimpact.analysis.figures.families import FAMILIES, Family, register
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.orchestrator.hard_cases import measuring
+from vibroimpact.orchestrator.orbits import basins, control, energies, lyapunov, maps, resonances
+from vibroimpact.orchestrator.study import effects
+from vibroimpact.orchestrator.study.accuracy import results as accuracy
+
+FORCED: dict[str, Any] = {
+    "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05},
+    "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
+    "stop": [{"position": 1.0, "restitution": 0.7}],
+    "record": {"transient_periods": 100, "recorded_periods": 60},
+}
+OVER = {"forcing.angular_frequency": np.linspace(0.8, 1.1, 7)}
+BOTH = OVER | {"stop[1].restitution": [0.7, 0.8]}
+NO_SCENE = {"square-root"}
+TABLES = (
+    *(measuring.TABLE, basins.TABLE, control.TABLE, energies.TABLE, lyapunov.TABLE, resonances.TABLE),
+    *(maps.STATES, maps.IMPACTS, maps.NORDMARK, maps.SQUARE_ROOT, effects.TABLE, accuracy.TABLE),
+)
+
+
+@pytest.fixture(scope="module")
+def scene() -> vi.Scene:
+    return vi.Scene.from_dict(FORCED)
+
+
+@pytest.fixture(scope="module")
+def runs(scene: vi.Scene) -> dict[str, xr.Dataset]:
+    sweeps = {"one": {}, "swept": OVER, "map": BOTH}
+    return {name: vi.run(scene.with_sweep(sweep), progress=False) for name, sweep in sweeps.items()}
+
+
+def drawn(found: Any) -> Figure:
+    figure = vi.draw(found)
+    axes = [axis for axis in figure.axes if axis.get_xlabel() or axis.get_ylabel()]
+    assert axes
+    assert any(axis.lines or axis.collections or axis.patches for axis in axes)
+    return figure
+
+
+OF_RUNS: dict[str, tuple[Callable[[xr.Dataset], Any], tuple[str, ...]]] = {
+    "energies": (vi.energies, ("one", "swept")),
+    "lyapunov": (vi.lyapunov, ("one", "swept", "map")),
+    "classify": (vi.classify, ("one", "swept", "map")),
+    "resonances": (vi.resonances, ("swept",)),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "which"), [(name, which) for name, (_, all_runs) in OF_RUNS.items() for which in all_runs]
+)
+def test_what_is_found_of_runs_is_drawn(name: str, which: str, runs: dict[str, xr.Dataset]) -> None:
+    found = OF_RUNS[name][0](runs[which])
+    drawn(found)
+    drawn(getattr(found, "dataset", found))
+
+
+@pytest.mark.parametrize("kind", maps.MAP_KINDS)
+def test_each_map_is_drawn(kind: str, scene: vi.Scene) -> None:
+    drawn(vi.maps(None if kind in NO_SCENE else scene, kind, **({} if kind in NO_SCENE else {"points": 60})))
+
+
+def test_basins_are_drawn_and_bear_their_kind(scene: vi.Scene, tmp_path: Path) -> None:
+    found = vi.basins(scene, (-1.0, 1.0), (-1.0, 1.0), (6, 6))
+    drawn(found)
+    vi.write_results(found, tmp_path / "basins.nc", kind=found.attrs["results_kind"])
+    with vi.open_measured(tmp_path / "basins.nc") as opened:
+        assert opened.attrs["results_kind"] == "basins"
+        drawn(opened)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pythonfmu") is None, reason="the controller is in Python")
+def test_a_kept_orbit_is_drawn(scene: vi.Scene) -> None:
+    drawn(vi.control(scene, 1.0, 0.97, step=1e-2))
+
+
+def test_hard_cases_are_drawn() -> None:
+    drawn(vi.hard_cases("grazing-from-below"))
+
+
+def test_orbits_are_a_list_with_a_dataset_and_both_are_drawn(scene: vi.Scene) -> None:
+    orbits = vi.find_orbits(scene, 1, 1)
+    drawn(orbits)
+    drawn(orbits.dataset)
+    assert orbits.dataset.sizes["run"] == len(orbits)
+    assert orbits.dataset.impact_velocity.values[0] == orbits[0].velocities[0]
+    assert len(repr(orbits[0])) < 100
+    assert repr(orbits[0]).startswith("<P(1,1), ")
+    assert "<td>P(1,1)</td>" in orbits._repr_html_()
+    none = type(orbits)([], orbits.units, dict)
+    with pytest.raises(DatasetError, match="expected orbits, got none"):
+        vi.draw(none)
+    with pytest.raises(DatasetError, match="expected one that is nowhere beyond a stop, got none"):
+        _ = none.dataset
+
+
+def test_classes_are_a_list_with_the_dataset_of_the_command(
+    runs: dict[str, xr.Dataset], tmp_path: Path
+) -> None:
+    vi.run(vi.Scene.from_dict(FORCED).with_sweep(BOTH), tmp_path / "runs.nc", progress=False)
+    in_this_process("classify", str(tmp_path / "runs.nc"), "-o", str(tmp_path / "classes.nc"))
+    found = vi.classify(runs["map"])
+    assert len(found) == 14
+    assert repr(found).startswith("<classes of 14 runs: ")
+    names = [name for name in found.dataset.variables if str(name).startswith("class_")]
+    with vi.open_dataset(tmp_path / "classes.nc") as opened:
+        for name in names:
+            xr.testing.assert_identical(found.dataset[name], opened[name])
+
+
+def test_classes_of_no_run_on_a_grid_are_missing(runs: dict[str, xr.Dataset]) -> None:
+    some = runs["map"].copy()
+    some["run_id"] = some.run_id.where(some.run_id < 13, -1)
+    classes = vi.classify(runs["map"])
+    placed = type(classes)(classes[:13], some).dataset
+    assert placed.class_kind.values.ravel().tolist().count(-1) == 1
+    assert placed.class_reason.values.ravel().tolist().count("") >= 1
+
+
+def test_every_table_of_results_is_of_a_kind_that_is_drawn() -> None:
+    for table in TABLES:
+        assert FAMILIES[table.kind].is_of_results
+        assert all(rule.long_name and rule.unit for rule in table.rules.values())
+
+
+def test_a_family_registers_once() -> None:
+    with pytest.raises(ValueError, match="basins: expected a family of another name, got one twice"):
+        register(Family("basins", "others", {}))
+
+
+def test_a_variable_that_is_in_no_table_is_refused() -> None:
+    with pytest.raises(DatasetError, match="lyapunov: speed: expected a variable of its table, got another"):
+        lyapunov.TABLE.dataset({"speed": 1.0})
