@@ -15,12 +15,13 @@ from support.impact_sweep import SCENE, Oscillator
 from typer.testing import CliRunner
 
 import vibroimpact as vi
-from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
+from vibroimpact.analysis import figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.figures.scene_text import limits
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.commands.typer_form import add_commands
 from vibroimpact.orchestrator.running import run_scene
 
 PNG = b"\x89PNG\r\n"
@@ -411,7 +412,7 @@ def test_the_ending_chooses_the_format(ending: str, start: bytes, tmp_path: Path
 def command_line() -> typer.Typer:
     app = typer.Typer()
     app.callback()(lambda: None)
-    commands.register(app)
+    add_commands(app, ["plot"])
     return app
 
 

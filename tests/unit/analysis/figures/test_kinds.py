@@ -14,7 +14,7 @@ from support.dataset_examples import dataset_of, record, up_down
 from support.replay_signals import HIT, channel, clock, ring
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
+from vibroimpact.analysis import figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.figures.families import FAMILIES
@@ -24,6 +24,7 @@ from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.commands.typer_form import add_commands
 
 
 def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
@@ -269,7 +270,7 @@ def test_a_recording_that_was_not_fitted_is_drawn_by_its_name_which_the_figure_s
 def plotted(*arguments: str) -> str:
     app = typer.Typer()
     app.callback()(lambda: None)
-    commands.register(app)
+    add_commands(app, ["plot"])
     done = CliRunner().invoke(app, ["plot", *arguments])
     if done.exception is not None:
         assert isinstance(done.exception, DatasetError | UsageError), done.exception
