@@ -67,6 +67,16 @@ class Notes(Progress):
         self.lines.append(text)
 
 
+def workers_here(patch: pytest.MonkeyPatch, most_chunks: int | None = None) -> None:
+    """Let campaigns have this process as their one worker."""
+
+    @contextmanager
+    def here(**_: object) -> Iterator[SerialPool]:
+        yield SerialPool(most_chunks)
+
+    patch.setattr(campaign, "open_workers", here)
+
+
 def campaign_here(
     patch: pytest.MonkeyPatch,
     text: str,
@@ -77,11 +87,6 @@ def campaign_here(
     notes: Notes | None = None,
 ) -> CampaignReport:
     """Run a campaign in this process."""
-
-    @contextmanager
-    def here(**_: object) -> Iterator[SerialPool]:
-        yield SerialPool(most_chunks)
-
     with patch.context() as patched:
-        patched.setattr(campaign, "open_workers", here)
+        workers_here(patched, most_chunks)
         return run_campaign(parse_scene(text, "test.toml"), folder, workers=1, runner=runner, progress=notes)
