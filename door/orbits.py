@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset import open_dataset, write_dataset
-from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.dataset import marked, open_dataset, write_dataset
+from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.found import FoundOrbits
@@ -28,7 +27,7 @@ from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, contro
 from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
 from vibroimpact.orchestrator.orbits.follow import Followed, FollowedLoci, follow_branches, follow_loci
 from vibroimpact.orchestrator.orbits.maps import map_of, settings_of
-from vibroimpact.returned import ONE_AT_A_TIME, in_memory
+from vibroimpact.returned import ONE_AT_A_TIME
 
 
 def find_orbits(
@@ -160,10 +159,11 @@ def follow(
         ranges = [FollowSettings(min(ends), max(ends), step) for ends in ((start, stop), second_range)]
         loci = follow_loci(FollowedLoci(followed, second), *ranges)
         result = loci if loci.loci else followed
-    with ONE_AT_A_TIME, ScratchFolder("orbits") as folder:
-        target = written or Path(folder.name, "branches.nc")
-        write_dataset(result.dataset, target)
-        return open_dataset(target) if written is not None else in_memory(target)
+    if written is None:
+        return opened_in_memory(marked(result.dataset))
+    with ONE_AT_A_TIME:
+        write_dataset(result.dataset, written)
+        return open_dataset(written)
 
 
 def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:

@@ -51,13 +51,6 @@ def new_variable(dims: str | tuple[Hashable, ...], values: Any, attrs: Mapping[A
     return xr.Variable(dims, values, attrs, fastpath=type(values) is np.ndarray)
 
 
-def loaded(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with all values in memory."""
-    variables = {name: loaded_variable(variable) for name, variable in dataset.variables.items()}
-    coords = {name: variables.pop(name) for name in dataset.coords}
-    return xr.Dataset(variables, coords=coords, attrs=dataset.attrs)
-
-
 def loaded_variable(variable: xr.Variable) -> xr.Variable:
     """Return a variable with its values in memory.
 

@@ -8,7 +8,6 @@ from tempfile import TemporaryDirectory
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset, write_dataset
-from vibroimpact.analysis.dataset.assembling import loaded
 from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.orchestrator.running.kept import opened_scene
 from vibroimpact.orchestrator.running.whole import run_whole
@@ -23,7 +22,7 @@ def assert_memory_is_file(scene: Scene) -> xr.Dataset:
     with TemporaryDirectory() as folder:
         write_dataset(flat, Path(folder, "run.nc"))
         with open_dataset(Path(folder, "run.nc")) as opened_file:
-            wanted = loaded(opened_file)
+            wanted = opened_file.load()
     xr.testing.assert_identical(found, wanted)
     assert list(found.variables) == list(wanted.variables)
     assert list(found.dims) == list(wanted.dims)

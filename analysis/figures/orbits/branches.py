@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
-from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside
+from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside, unit_symbol
 from vibroimpact.analysis.figures.sweep.diagrams import (
     draw_map,
     edges,
@@ -88,12 +88,19 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
         if over is not None:
             draw_below(axis, over, name, panel)
         _draw(axis, dataset, name, panel)
-        axis.set_ylabel(label(dataset[panel]))
+        axis.set_ylabel(_label(dataset, panel))
         axis.margins(x=0.02)
     axes[-1].set_xlabel(label(dataset[name]))
     words = axes[0].get_legend_handles_labels()[1]
     legend_outside(figure, axes[0], ncols=3 if max(map(len, words)) < _LONG else 2)
     return figure
+
+
+def _label(dataset: xr.Dataset, panel: str) -> str:
+    if panel in dataset.variables:
+        return label(dataset[panel])
+    # of orbits that were not opened from a file
+    return f"displacement range ({unit_symbol(dataset['displacement_max'])})"
 
 
 def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -> Figure:

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 from support.command_line import in_this_process
+from support.places import EXAMPLES
 
 import vibroimpact as vi
 from vibroimpact.analysis.figures.families import FAMILIES, Family, register
@@ -148,3 +149,9 @@ def test_a_family_registers_once() -> None:
 def test_a_variable_that_is_in_no_table_is_refused() -> None:
     with pytest.raises(DatasetError, match="lyapunov: speed: expected a variable of its table, got another"):
         lyapunov.TABLE.dataset({"speed": 1.0})
+
+
+def test_orbits_of_one_frequency_are_seen_as_branches() -> None:
+    figure = vi.draw(vi.find_orbits(EXAMPLES / "bifurcation.toml").dataset, "branches")
+    assert {line.get_marker() for axis in figure.axes for line in axis.lines} == {"o"}
+    assert figure.axes[0].get_ylabel() == "displacement range (-)"

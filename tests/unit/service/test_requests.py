@@ -48,7 +48,7 @@ def test_a_job_carries_out_the_operation_that_was_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[EstimateImpacts] = []
-    monkeypatch.setattr(EstimateImpacts, "carry_out", lambda asked: done.append(asked))
+    monkeypatch.setattr(EstimateImpacts, "carry_out", lambda asked, spelling: done.append(asked))
     asked = {"kind": "impacts", "stop": 2.0, "stop_position": 0.5, "mass": 3.0}
     requests.estimate(tmp_path, {"data": "a.nc", "asked": asked})
     place = {"data": tmp_path / "a.nc", "output": tmp_path / requests.OUTPUT, "force": True}
