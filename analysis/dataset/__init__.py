@@ -1,8 +1,8 @@
 """The door to the dataset: its schema, its writers and its readers.
 
 `schema` holds the table of names, dimensions, units and meanings, `checking` the check against it; `writing`
-builds and writes; `merging` joins parts; `reading` opens; `accessor` is `ds.vibroimpact`, which `backend` registers
-with xarray. Everything public is importable from here.
+builds and writes; `merging` joins parts; `reading` opens; `accessor` is `ds.vibroimpact`, which `registering`
+tells xarray; `backend` is its engine. Everything public is importable from here.
 """
 
 from __future__ import annotations

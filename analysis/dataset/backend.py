@@ -12,6 +12,8 @@ from typing import Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
+from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
+
 
 class VibroimpactBackend(BackendEntrypoint):
     """Opens datasets of runs and results of analyses with all checks, runs on the dimensions of their sweep."""
@@ -47,13 +49,3 @@ class VibroimpactBackend(BackendEntrypoint):
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Return False: a file that names no engine opens as it does without this package."""
         return False
-
-
-def accessor(dataset: xr.Dataset) -> Any:
-    """Return what `ds.vibroimpact` is; its module is imported when it is first asked for."""
-    from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
-
-    return VibroimpactAccessor(dataset)
-
-
-xr.register_dataset_accessor("vibroimpact")(accessor)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from xarray.backends import StoreBackendEntrypoint
 
 from vibroimpact.analysis.dataset.assembling import assembled
-from vibroimpact.analysis.dataset.backend import VibroimpactBackend  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
 from vibroimpact.analysis.dataset.grid import on_grid, shared_axes
+from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.schema import (
     SCHEMA_VERSION,
     swept_names,

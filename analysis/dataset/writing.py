@@ -13,7 +13,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import Described, assembled, loaded_variable, wrapped
-from vibroimpact.analysis.dataset.backend import VibroimpactBackend  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.columns import (
     OF_ALL_PERIODS,
@@ -23,6 +22,7 @@ from vibroimpact.analysis.dataset.columns import (
     columns_of,
     ragged,
 )
+from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,

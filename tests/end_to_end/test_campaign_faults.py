@@ -441,7 +441,7 @@ def test_a_full_folder_for_temporary_files_is_named_and_no_defect(
 
     monkeypatch.setattr(engine, "open_workers", full)
     with pytest.raises(CampaignError, match=r"/full/notes: .*No space left.*folder for temporary files"):
-        run_campaign(scene_of(frequency_text(10)), tmp_path / "campaign")
+        run_campaign(scene_of(frequency_text(10)), tmp_path / "campaign", workers=1)
 
 
 @pytest.fixture

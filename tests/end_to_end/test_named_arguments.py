@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from support.spike_signals import channel, pulses
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.fmus.processes.call import call
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, campaign
 from vibroimpact.orchestrator.ssp import export_system
 from vibroimpact.service.job_process import Work
@@ -315,9 +316,10 @@ def served(process: str, *arguments: str | Path) -> list[str]:
 
 
 def test_processes_of_the_service_name_arguments_as_python_does(files: Path, decay: Path) -> None:
-    (said,) = served("import_process", files / "words.csv", files / "recording.nc", "{}")
-    assert json.loads(said)["failed"].endswith("Give delimiter and decimal if it is.")
-    served("import_process", files / "plain.csv", files / "recording.nc", "{}")
+    imported = partial(call, "vibroimpact.service.import_process:answer", seconds=60.0)
+    said = imported(str(files / "words.csv"), str(files / "recording.nc"), "{}").answer
+    assert said["failed"].endswith("Give delimiter and decimal if it is.")
+    imported(str(files / "plain.csv"), str(files / "recording.nc"), "{}")
     assert vi.open_recording("recording.nc").remarks == (
         IS_TIME.format("time_column"),
         NO_UNIT.format("unit"),

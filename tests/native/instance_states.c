@@ -49,7 +49,7 @@ static void update_outputs(void *self)
     ((thing *)self)->rows[0] = ((thing *)self)->input;
 }
 
-static size_t used_size(const void *self)
+static size_t size_of_used(const void *self)
 {
     return offsetof(thing, rows) + (size_t)((const thing *)self)->used * sizeof(double);
 }
@@ -67,7 +67,7 @@ const vi_component vi_this_component = {
     .initialize = initialize,
     .was_set = was_set,
     .update_outputs = update_outputs,
-    .used_size = used_size,
+    .used_size = size_of_used,
 };
 
 static int lines;

@@ -26,7 +26,9 @@ def of_package(package: str) -> dict[str, type[Operation]]:
 
 
 def assert_sound(operation: type[Operation]) -> None:
-    """Assert that each argument has words, and that what the operation runs takes the operation alone."""
+    """Assert that each argument has words, and that what is run takes the operation and keywords with defaults."""
     assert all(field.words.help for field in operation.fields())
     parameters = inspect.signature(pkgutil.resolve_name(f"vibroimpact.{operation.runs}")).parameters
-    assert [one.annotation for one in parameters.values()] == [operation.__name__]
+    first, *others = parameters.values()
+    assert first.annotation == operation.__name__
+    assert all(one.default is not one.empty for one in others)
