@@ -98,7 +98,7 @@ KINDS = {
     "two signals": "import two.csv --rate 1000 --unit m/s^2 --unit m/s^2",
     "recorded run": "rig record --rig RIG --channel tip=Dev1/ai0,5 --rate 1000 --duration 0.2",
     "recorded spikes": "rig spikes --rig RIG --channel tip=Dev1/ai0,5 --rate 1000 "
-    "--threshold 0.5 --duration 0.5",
+    "--threshold 0.5 --presamples 10 --postsamples 10 --duration 0.5",
     "recovered recording": "rig recover rig.journal",
     "measured sweep": "rig sweep sweep.toml --rig RIG",
     "estimates of a decay": "estimate decay [recording]",
