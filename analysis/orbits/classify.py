@@ -20,6 +20,12 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.accessor import run_ids
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
+from vibroimpact.analysis.orbits.impact_classes import (
+    has_named_contacts,
+    impacts_of_runs,
+    own_period,
+    states_of_periods,
+)
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.html_view import html_table
 
@@ -112,7 +118,8 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     ----------
     dataset : xarray.Dataset
         As `open_dataset` gives it. It needs the strobe or the extrema of each recorded period, and impacts, or their
-        number in each period; without the latter a motion may be periodic, but impacts are not told.
+        number in each period; without the latter a motion may be periodic, but impacts are not told. Of components
+        that hit each other impacts are enough, but do not tell chaos.
 
     Returns
     -------
@@ -126,6 +133,9 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     """
     runs = dataset.vibroimpact.runs
     columns = [name for name in _STATES if name in runs.variables]
+    if not columns and has_named_contacts(dataset):
+        told = zip(impacts_of_runs(dataset), runs["outcome"].values, strict=True)
+        return ClassesOfRuns((_by_impacts(*each, Outcome(int(end))) for each, end in told), dataset)
     if not columns:
         raise DatasetError("classify: expected strobe or extrema in the dataset, got neither. Record them.")
     for name in columns:
@@ -147,6 +157,27 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
         for run in range(len(states))
     )
     return ClassesOfRuns(found, dataset)
+
+
+def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) -> RunClass:
+    """Return the class of a run of which impacts alone are known."""
+    if outcome is not Outcome.ok:
+        return class_of(np.empty((0, 1)), None, outcome)
+    if not impacts.sizes["impact"]:
+        return RunClass(OrbitClass.no_impacts)
+    if frequency is None:
+        return RunClass(OrbitClass.unknown, reason="several forcing frequencies")
+    if not frequency:
+        if impacts.sizes["impact"] < FEWEST:
+            return RunClass(OrbitClass.unknown, reason=f"fewer than {FEWEST} recorded impacts")
+        count, why = own_period(impacts, SAME)
+        return RunClass(OrbitClass.periodic, count, 1) if count else RunClass(OrbitClass.unknown, reason=why)
+    states, counts = states_of_periods(impacts, frequency)
+    found = class_of(states, counts, has_stuck=bool(np.isinf(counts).any()))
+    if found.kind is not OrbitClass.chaos:
+        return found
+    reason = f"no period up to {len(states) // 2}; impacts alone do not tell chaos"
+    return RunClass(OrbitClass.unknown, reason=reason)
 
 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:

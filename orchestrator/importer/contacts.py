@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts
 from vibroimpact.orchestrator.importer.pairs.all_pairs import Pairs
 from vibroimpact.orchestrator.importer.pairs.pair import Pair
 from vibroimpact.orchestrator.importer.pairs.rigid_stops import RigidStop
@@ -148,6 +149,11 @@ class ContactBonds:
         self.pairs.pulses.end_step(size)
         met = [pair.lower.body for pair in self.pairs.pairs if pair.arrived]
         return [*(bond.body for bond in self._held if bond.arrived), *met]
+
+    @property
+    def impacts(self) -> tuple[list[ContactImpacts], list[ContactImpacts]]:
+        """Those of contacts with stops, and those of pairs, each in the order of their specifications."""
+        return [bond.impacts for bond in self.held], [pair.impacts for pair in self.pairs.specified]
 
     def remarks(self) -> list[str]:
         """What a reader of the results must know of held forces, and of bodies at rest on each other."""

@@ -20,11 +20,11 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import Described, wrapped
 from vibroimpact.analysis.dataset.columns import RunColumns, arrays_of
-from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
+from vibroimpact.analysis.dataset.schema import RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
-from vibroimpact.orchestrator.run.empty_record import empty_record, sample_variables
+from vibroimpact.orchestrator.run.empty_record import empty_record, records_impacts, sample_variables
 from vibroimpact.orchestrator.run.measuring.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.scene import Scene
@@ -63,6 +63,8 @@ class DatasetForm:
         stored = dict(zip(sample_variables(scene), stored_samples(scene), strict=True))
         of_channels = channel_attributes(scene).items()
         self._attributes = {stored[name]: own for name, own in of_channels} | _described(scene, self._names)
+        if general is not None and records_impacts(scene):
+            self._attributes["impact_contact"] = _named_contacts([each.name for each in general.contacts])
 
     def dataset(
         self,
@@ -230,6 +232,15 @@ def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         return {}
     unsaid = {file: key for key, file in names.items() if cf_unit(scene, key) is None}
     return {file: f"{file.replace('_', ' ')} in {_unit(scene, key)}" for file, key in unsaid.items()}
+
+
+def _named_contacts(names: Sequence[str]) -> dict[str, Any]:
+    """Return the attributes of the number of a contact: what each number means."""
+    return {
+        "long_name": "number of the contact of the scene, from 1",
+        "flag_values": np.arange(1, len(names) + 1, dtype=RULES["impact_contact"].dtype),
+        "flag_meanings": " ".join(file_names(names, ())),
+    }
 
 
 def _omitted(scene: Scene) -> tuple[str, ...]:

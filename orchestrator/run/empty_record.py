@@ -13,8 +13,12 @@ from vibroimpact.analysis.dataset import (
     Outcome,
     RunRecord,
 )
+from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
+
+MOST_CONTACTS = int(np.iinfo(RULES["impact_contact"].dtype).max)
+"""Contacts of a scene of components that a table of impacts can number."""
 
 
 def sample_variables(scene: Scene) -> tuple[str, ...]:
@@ -22,6 +26,12 @@ def sample_variables(scene: Scene) -> tuple[str, ...]:
     if scene.general is not None:
         return scene.general.variables if scene.general.rate is not None else ()
     return scene.record.time_series.variables if scene.record.time_series else ()
+
+
+def records_impacts(scene: Scene) -> bool:
+    """Say whether runs of a scene have a table of impacts: of components it is that of their contacts."""
+    contacts = None if scene.general is None else len(scene.general.contacts)
+    return scene.record.impacts and (contacts is None or 0 < contacts <= MOST_CONTACTS)
 
 
 def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -> RunRecord:
@@ -44,7 +54,7 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
         outcome=outcome,
         message=message,
         periods=np.empty((0, len(PERIOD_COLUMNS))) if periods else None,
-        impacts=np.empty((0, len(IMPACT_COLUMNS))) if record.impacts and not general else None,
+        impacts=np.empty((0, len(IMPACT_COLUMNS))) if records_impacts(scene) else None,
         sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and not general else None,
         samples=np.empty((0, 1 + len(names))) if names else None,
         seconds=seconds,

@@ -14,10 +14,13 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
 from vibroimpact.orchestrator.importer.component import Value
+from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts, impact_rows
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.events import Event, LateEvents
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
+from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.run.empty_record import MOST_CONTACTS, records_impacts
 from vibroimpact.orchestrator.run.record import (
     Deadline,
     DeadlineReached,
@@ -75,6 +78,12 @@ class GeneralRunner(Runner):
         self.fmu_hashes = {name: c.sha256 for name, c in self._importer.components.items()}
         self._events: list[NDArray[np.float64]] = []  # rows of time, index and component, counted from 1
         self._recording = False
+
+    @property
+    def _impacts(self) -> list[ContactImpacts]:
+        """The impacts of each contact, in the order of the scene."""
+        stops, pairs = map(iter, self._importer.contacts.impacts)
+        return [next(pairs if isinstance(each, PairSpec) else stops) for each in self._general.contacts]
 
     def _build(self) -> None:
         """Make the importer with all that watches it."""
@@ -155,6 +164,9 @@ class GeneralRunner(Runner):
                 self._energy.begin(general.connections)
                 self._importer.advance(record.transient_time)
                 self._recording = True
+                if record.transient_time:
+                    for impacts in self._impacts:
+                        impacts.forget()
                 if self._sampler is not None:
                     self._sampler.begin(record.transient_time, end)
                 self._importer.advance(end)
@@ -182,6 +194,10 @@ class GeneralRunner(Runner):
             for name, component in self._importer.components.items()
             if component.instance.changed_rounding
         ]
+        if self.scene.record.impacts and len(self._general.contacts) > MOST_CONTACTS:
+            remarks.append(
+                f"{len(self._general.contacts)} contacts: of more than {MOST_CONTACTS} no impacts are kept"
+            )
         remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
         remarks += [
             f"{name} made no instance with the event mode that it declares, and ran without"
@@ -254,6 +270,7 @@ class GeneralRunner(Runner):
             events=in_time_order(np.concatenate([NO_ROWS, *self._events]))
             if self.scene.record.impacts
             else None,
+            impacts=impact_rows(self._impacts) if records_impacts(self.scene) else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,
             loop_residual=self._importer.loops.residual if self._importer.loops.names else None,
         )

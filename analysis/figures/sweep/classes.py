@@ -143,23 +143,37 @@ def _draw_map(dataset: xr.Dataset, along: str, across: str) -> Figure:
     return figure
 
 
+def _points(dataset: xr.Dataset, runs: xr.Dataset) -> tuple[str, Any, Any]:
+    """Return the quantity that shows runs, and of each of its values the place of its run, and itself.
+
+    A run without an impact has the speed 0, where impacts are all that is recorded.
+    """
+    quantity = next((q for q in ("displacement_max", "strobe_displacement") if q in runs), None)
+    if quantity is not None:
+        values = runs[quantity].values
+        return quantity, np.repeat(np.arange(len(values)), values.shape[1]), values.ravel()
+    if "impact_velocity" not in dataset:
+        raise DatasetError("figure: expected extrema or strobe in the dataset, got neither.")
+    table = dataset.vibroimpact.impacts_table()
+    owner = np.searchsorted(runs["run_id"].values, table["run_id"].values)
+    bare = np.setdiff1d(np.arange(runs.sizes["run"]), owner)
+    values = np.concatenate([table["impact_velocity"].values, np.zeros(bare.size)])
+    return "impact_velocity", np.concatenate([owner, bare]), values
+
+
 def _draw_sweep(dataset: xr.Dataset, name: str) -> Figure:
     runs = dataset.vibroimpact.runs
-    quantity = next((q for q in ("displacement_max", "strobe_displacement") if q in runs), None)
-    if quantity is None:
-        raise DatasetError("figure: expected extrema or strobe in the dataset, got neither.")
+    quantity, owner, values = _points(dataset, runs)
     names = _names(runs, dataset)
     palette = _palette(names)
     figure = canvas(70)
     axis = figure.subplots()
     shown = np.array([each if each in palette else "other" for each in names])
-    values = runs[quantity].values
     for each, colour in palette.items():
-        chosen = shown == each
-        x = np.repeat(runs[name].values[chosen], values.shape[1])
+        chosen = shown[owner] == each
         axis.plot(
-            x,
-            values[chosen].ravel(),
+            runs[name].values[owner[chosen]],
+            values[chosen],
             linestyle="none",
             marker=".",
             markersize=2,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+from vibroimpact.orchestrator.importer.pairs.ends import Motion
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath
 
@@ -127,6 +128,11 @@ class PairForce:
         self.value = _secant(force, answer, self._before)
         self._before = force, answer
         return self.value != force
+
+    def at(self, now: Motion) -> float:
+        """Return the force of the law where the bodies are now, N."""
+        assert self.law is not None
+        return self.law.force(-now.gap, now.closing)
 
     def excess(self, gap: float, closing: float, size: float) -> float:
         """Return the closing speed that a force at rest has left at the end of a step, m/s."""

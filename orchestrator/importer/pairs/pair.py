@@ -17,6 +17,7 @@ from contextlib import ExitStack, contextmanager
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts
 from vibroimpact.orchestrator.importer.pairs.ends import (
     BodyRate,
     Motion,
@@ -67,6 +68,8 @@ class Pair:
         Steps may have to be repeated: always.
     restitution : float
         Coefficient of restitution.
+    impacts : ContactImpacts
+        Those of the run.
     begins_pressed : bool
         The step under way is the first, and a contact that yields begins with it.
     """
@@ -93,6 +96,7 @@ class Pair:
                 )
         self.bodies = tuple({end.body.name: end.body for end in (self.lower, self.upper)}.values())
         self._scale = scale
+        self.impacts = ContactImpacts()
         # what variables of other tools' bodies mean is not known
         self._rates = [BodyRate(end.body) for end in (self.lower, self.upper) if isinstance(end, PortEnd)]
         self.take(spec)
@@ -114,6 +118,7 @@ class Pair:
         """
         self.lower.begin(time)
         self.upper.begin(time)
+        self.impacts.forget()
         rate = max((rate.fastest() for rate in self._rates), default=0.0)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._force.begin(self._reduced)
@@ -186,9 +191,12 @@ class Pair:
         target = min(target, time + self._longest)
         if not self.closed:
             self._force.let_go()
+            if was_closed and self.yields:
+                self.impacts.part(time, -start.closing)
             return target
         if self.yields and not was_closed:
             self._force.arrive(start.closing)
+            self.impacts.touch(time, start.closing)
         if self.yields:
             target = min(target, time + self._force.time_scale(start.gap) / steps)
         else:
@@ -266,6 +274,8 @@ class Pair:
         deep = DEEP * max(self._scale.displacement, self._held_back()) + self._room
         if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
+        if self.closed and self.yields:
+            self.impacts.press(self._force.value * size, self._force.at(self.look()))
         if self.rests:
             gap = self.look().gap + self._surface
             self._overlap, self._opening = max(self._overlap, -gap), max(self._opening, gap)
@@ -343,6 +353,8 @@ class Pair:
         impulse = (1.0 + restitution) * now.closing * self._reduced
         self.lower.strike(-impulse)
         self.upper.strike(impulse)
+        if now.closing > self._scale.slow:
+            self.impacts.strike(time, now.closing, impulse, restitution)
         if self._force.resting:
             self._part(now.gap)
             now = now._replace(gap=max(now.gap, 0.0))

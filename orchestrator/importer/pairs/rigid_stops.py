@@ -44,6 +44,7 @@ class RigidStop(Pair):
         self._face = SurfaceEnd(components[contact.stop])
         spec = PairSpec(point, (contact.stop, "position"), law="restitution")
         super().__init__(spec, self._point, self._face, pairs.scale, pairs.pulses)
+        self.impacts = bond.impacts
 
     @property
     def struck(self) -> Component:

@@ -21,6 +21,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
 from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import (
@@ -92,6 +93,8 @@ class HeldForceBond:
         Effective mass of the contact point, kg; None until a trial step finds it.
     residual : float
         Energy that the body was given beyond the law of the stop, J.
+    impacts : ContactImpacts
+        Those of the run.
     """
 
     def __init__(
@@ -109,12 +112,14 @@ class HeldForceBond:
         self._trials = TrialSteps(self.body, spec.velocity, self._input)
         self.revisable = self.body.has_states
         self.given_mass = spec.mass
+        self.impacts = ContactImpacts()
         self.active = self.closed = self.arrived = self.begins_pressed = False
         self.residual = 0.0
 
     def begin(self) -> None:
         """Start a run: the parameters are set."""
         self.stop.begin()
+        self.impacts.forget()
         self._input.parts[self.contact.stop] = 0.0
         self.mass = self.given_mass
         self.active = self.closed = self.arrived = self.begins_pressed = False
@@ -151,11 +156,14 @@ class HeldForceBond:
             self.closed = self._touches(*self._start, size)
             if self.closed:
                 if not was_closed:
+                    self.impacts.touch(time, self._start[1])
                     self._begin_contact(size)
                 size = self._foresee(min(size, max(self._limit, self._room)))
             elif not self.revisable:
                 size = self._foreseen_arrival(size)
             self.begins_pressed = self._is_new and self.closed and self._presses(size)
+        if was_closed and not self.closed:
+            self.impacts.part(time, -self._start[1])
         self._is_new = False
         self.active = self.closed or self.revisable
         self._planned = target if size == target - time else time + size
@@ -198,6 +206,8 @@ class HeldForceBond:
         with self.stop.asking():
             touched = self.closed or self._inside(path) is not None
             work = self.stop.work(path) if touched else 0.0
+        if self.closed:
+            self.impacts.press(self._force * size, self._force)
         self._work.count(work)
         self.residual += work - self._force * (path.end - path.start)
         self.arrived = touched and not self.closed
