@@ -23,6 +23,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError, VibroimpactError, WorkersGoneError
 from vibroimpact.fmus.processes.child import end_when_closed, private_pipes
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
+from vibroimpact.orchestrator.run.dataset import tally
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene
@@ -116,7 +117,7 @@ def run(folder: Path, work: Work) -> None:
     prepared = prepared_scene(scene, progress.note)
     if work.kind == "run":
         progress.begin(1, 0)
-        say(outcomes=dict(run_scene(prepared, folder / "run.nc")))
+        say(outcomes=tally(run_scene(prepared, folder / "run.nc")))
         progress.advance(1)
         return
     workers = None if work.scheduler else work.workers

@@ -23,7 +23,7 @@ from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.fmus.messages import CALL, WITH_OUTPUT, Message, message
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, ChunkResult, Work, get_ready
+from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, get_ready
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
     Kept,
@@ -68,7 +68,9 @@ from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axe
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.dataset import DatasetForm, has_messages
 from vibroimpact.orchestrator.run.progress import Progress
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 from vibroimpact.orchestrator.scene.sweep import run_count
@@ -166,6 +168,7 @@ class _Campaign:
         hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
         self._kept_path = kept_path(self._parts_folder, hashed)
         self._rounds: Rounds | None = None
+        self._form: DatasetForm | None = None
         self._begins_here = here and may_begin_here(scene, runner, self._report.runs)
         self._work = Work(
             scene.model_copy(update={"source": source}),
@@ -363,8 +366,11 @@ class _Campaign:
 
     def _computed_here(self, stages: Iterator[Stage]) -> Iterator[Stage]:
         """Compute in this process what is quickly done; return what is left for workers."""
-        with opened_here(self._work) as identity:
-            if identity is None or (self._manifest and runner_differences(self._manifest, identity)):
+        with opened_here(self._work) as opened:
+            if opened is None:
+                return stages
+            identity, self._form = opened.runner.identity, opened.form
+            if self._manifest and runner_differences(self._manifest, identity):
                 return stages  # what differs from what began is the workers' to compare
             if self._manifest is None:
                 write_manifest(self._manifest_path, self._scene, identity, self._report.runs)
@@ -441,7 +447,8 @@ class _Campaign:
         """Make the dataset; returns the parts that prevent it, which are removed, each with the reason."""
         began = time.perf_counter()
         try:
-            compact(parts, self._report.dataset, self._scene, self._attributes())
+            form = self._form or DatasetForm(self._scene)
+            dataset = compact(parts, self._report.dataset, form, self._attributes())
         except DatasetError as error:
             unfit = list(unfit_parts(parts, self._scene))
             if not unfit:
@@ -463,6 +470,7 @@ class _Campaign:
                 )
             ) from error
         remove_parts(self._parts_folder)
+        self._report.is_silent = not has_messages(dataset)
         self._report.compaction_seconds = time.perf_counter() - began
         return []
 

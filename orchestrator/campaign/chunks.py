@@ -24,14 +24,13 @@ from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
-from vibroimpact.orchestrator.run.dataset import dataset_of, empty_dataset, tally
+from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.points import PointColumns, State, columns_of_points
+from vibroimpact.orchestrator.running.kept import OpenedScene
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, expand
-
-DEFAULT_RUNNER = "vibroimpact.orchestrator.running.opening:open_scene"
-"""What opens a scene, as `module:name`, so that a worker can find it by itself."""
 
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
@@ -125,29 +124,33 @@ class ChunkResult:
     compute_seconds: float
 
 
-_runners: list[Runner] = []
-"""The runner that this process has opened for chunks, to be closed where the process lives on."""
+_at_work: dict[Work, tuple[tuple[Branch, ...], OpenedScene]] = {}
+"""What this process has opened for chunks, and the branches of its scene: one scene at most."""
 
 
-@lru_cache(maxsize=1)
-def _opened(scene: Scene, runner: str, execution: str) -> tuple[tuple[Branch, ...], Runner]:
+def _opened(work: Work) -> tuple[tuple[Branch, ...], OpenedScene]:
     """Return the branches of a scene, and what runs their points in this process."""
-    opened = named_runner(scene, runner, execution or None)
-    _runners[:] = [opened]
-    return expand(scene), opened
+    key = Work(work.scene, "", work.runner, execution=work.execution)
+    if key not in _at_work:
+        take_up(key, OpenedScene(work.scene, named_runner(work.scene, work.runner, work.execution or None)))
+    return _at_work[key]
+
+
+def take_up(work: Work, opened: OpenedScene) -> None:
+    """Let chunks run by a scene that is open in this process."""
+    lay_down()
+    _at_work[Work(work.scene, "", work.runner, execution=work.execution)] = expand(work.scene), opened
+
+
+def lay_down() -> None:
+    """Let go of what chunks have run by; whoever opened it closes it."""
+    _at_work.clear()
+    _kept_runs.cache_clear()
 
 
 def runner_identity(work: Work) -> RunnerIdentity:
     """Open the scene in this process, where it stays open, and return which runner it has."""
-    return _opened(work.scene, work.runner, work.execution)[1].identity
-
-
-def close_opened() -> None:
-    """Close what this process has opened for chunks."""
-    if _runners:
-        _runners.pop().close()
-    _opened.cache_clear()
-    _kept_runs.cache_clear()
+    return _opened(work)[1].runner.identity
 
 
 def get_ready(work: Work) -> RunnerIdentity:
@@ -167,27 +170,29 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     CampaignError
         When this worker's runner is not the one the campaign began with, or the part cannot be written.
     """
-    branches, runner = _opened(work.scene, work.runner, work.execution)
-    _refuse_other_runner(work, runner)
+    branches, opened = _opened(work)
+    _refuse_other_runner(work, opened.runner)
     began = time.perf_counter()
     points = _points_left(work, work.branches or branches, chunk)
     if not len(points):
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     deadline = began + chunk.most_seconds
-    records, carried = runner.rows(points, chunk.start, deadline)
+    opened.failed = True  # until it has ended
+    records, carried = opened.runner.rows(points, chunk.start, deadline)
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
     done = replace(chunk, stop=stop)
-    outcomes = write_part(work, done, points.taken(len(records)), records, carried)
+    outcomes = write_part(work, done, opened.form, points.taken(len(records)), records, carried)
+    opened.failed = Outcome.error.name in outcomes
     return ChunkResult(done, carried, outcomes, seconds)
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
     """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
-    branches, runner = _opened(work.scene, work.runner, work.execution)
-    _refuse_other_runner(work, runner)
+    branches, opened = _opened(work)
+    _refuse_other_runner(work, opened.runner)
     points = points_of(branches, chunk)
-    records, _ = runner.rows(points, chunk.start)
+    records, _ = opened.runner.rows(points, chunk.start)
     return dataset_of(work.scene, points, records, {})
 
 
@@ -195,7 +200,8 @@ def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
     points = _points_left(work, work.branches or expand(work.scene), chunk)
     records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in range(len(points))]
-    return ChunkResult(chunk, chunk.start, write_part(work, chunk, points, records, chunk.start), 0.0)
+    written = write_part(work, chunk, DatasetForm(work.scene), points, records, chunk.start)
+    return ChunkResult(chunk, chunk.start, written, 0.0)
 
 
 def _refuse_other_runner(work: Work, runner: Runner) -> None:
@@ -241,6 +247,7 @@ def carried_state(attrs: Mapping[str, Any]) -> State | None:
 def write_part(
     work: Work,
     chunk: Chunk,
+    form: DatasetForm,
     points: PointColumns,
     records: Sequence[RunRecord] | RunColumns,
     carried: State | None,
@@ -253,7 +260,7 @@ def write_part(
         attrs |= carried_attributes(carried)
     path = Path(work.parts_folder, chunk.part_name)
     try:
-        dataset = dataset_of(work.scene, points, records, attrs)
+        dataset = form.dataset(points, records, attrs)
         write_dataset(dataset, path)
     except OSError as error:
         raise CampaignError(

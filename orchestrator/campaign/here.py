@@ -14,18 +14,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
     ChunkResult,
     Work,
-    close_opened,
+    lay_down,
     run_chunk,
-    runner_identity,
+    take_up,
 )
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.rounds import Stage
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.record import RunsAbandonedError, runs_abandoned
+from vibroimpact.orchestrator.running.kept import OpenedScene, opened_scene
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 
 HERE_SECONDS = 2.0
@@ -46,15 +46,17 @@ def may_begin_here(scene: Scene, runner: str, points: int) -> bool:
 
 
 @contextmanager
-def opened_here(work: Work) -> Iterator[RunnerIdentity | None]:
+def opened_here(work: Work) -> Iterator[OpenedScene | None]:
     """Open a scene in this process for a while; None where another campaign of this process computes in it."""
     if not _ONE_AT_A_TIME.acquire(blocking=False):
         yield None
         return
     try:
-        yield runner_identity(work)
+        with opened_scene(work.scene, work.execution or None, work.runner) as opened:
+            take_up(work, opened)
+            yield opened
     finally:
-        close_opened()
+        lay_down()
         _ONE_AT_A_TIME.release()
 
 

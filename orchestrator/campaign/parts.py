@@ -26,6 +26,7 @@ from vibroimpact.analysis.dataset import (
     refuse_unlike,
     write_dataset,
 )
+from vibroimpact.analysis.dataset.assembling import wrapped
 from vibroimpact.analysis.files.fingerprints import has_recorded_hash
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import (
@@ -35,7 +36,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
     carried_state,
 )
-from vibroimpact.orchestrator.run.dataset import empty_dataset, with_constants_of
+from vibroimpact.orchestrator.run.dataset import DatasetForm, empty_dataset
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
 
@@ -130,7 +131,7 @@ def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) ->
     return StoredPart(path, chunk, carried_state(part.attrs), part.run_index.size)
 
 
-def compact(parts: Sequence[Path], target: Path, scene: Scene, attrs: Mapping[str, Any]) -> xr.Dataset:
+def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> xr.Dataset:
     """Write the rows of all parts as one dataset, whole or not at all, with the numbers that the scene does not sweep.
 
     Returns
@@ -149,7 +150,7 @@ def compact(parts: Sequence[Path], target: Path, scene: Scene, attrs: Mapping[st
     # Those of the first part: what they say of it is not true of all runs.
     own = (*CARRIED, CARRIED_STATE, MANIFEST, "scene_hash")
     dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in own} | dict(attrs)
-    dataset = with_constants_of(dataset, scene)
+    dataset = dataset.assign_coords(wrapped(form.constants()))
     write_dataset(dataset, target)
     return dataset
 

@@ -36,6 +36,8 @@ class CampaignReport:
         From the first chunk handed out to the last one done; workers were ready before, s.
     compaction_seconds : float
         Making one dataset of the parts, s.
+    is_silent : bool
+        No run of the dataset failed or warns of anything, as is known where it was made now.
     """
 
     dataset: Path
@@ -47,3 +49,4 @@ class CampaignReport:
     lost_workers: int = 0
     compute_seconds: float = 0.0
     compaction_seconds: float = 0.0
+    is_silent: bool = False

@@ -43,7 +43,7 @@ def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | No
     if report.lost_workers:
         lost = "was lost; what it" if report.lost_workers == 1 else "were lost; what they"
         say(f"{counted(report.lost_workers, 'worker')} {lost} had not finished was computed again.", err=True)
-    for line in outcome_lines(report.dataset, report.runs):
+    for line in () if report.is_silent else outcome_lines(report.dataset, report.runs):
         say(line, err=True)
 
 

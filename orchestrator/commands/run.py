@@ -12,6 +12,7 @@ from vibroimpact.orchestrator.campaign.manifest import holds_scene
 from vibroimpact.orchestrator.commands.failures import FAILED, counted, outcome_lines
 from vibroimpact.orchestrator.commands.preparing import prepared
 from vibroimpact.orchestrator.operations.run import Run
+from vibroimpact.orchestrator.run.dataset import has_messages
 from vibroimpact.orchestrator.run.progress import shown_progress
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene.summary import in_one_line
@@ -33,11 +34,12 @@ def run_to_dataset(options: Run) -> None:
     loaded = prepared(loaded)
     refuse_overwriting(output, options.force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:
-        outcomes = run_scene(loaded, output, progress=progress)
-    runs = sum(outcomes.values())
+        found = run_scene(loaded, output, progress=progress)
+    runs = found.sizes["run"]
     say(f"{counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
     say(in_one_line(loaded))
-    for line in outcome_lines(output, runs):
-        say(line, err=True)
-    if runs == 1 and any(kind.name in outcomes for kind in FAILED):
+    if has_messages(found):
+        for line in outcome_lines(output, runs):
+            say(line, err=True)
+    if runs == 1 and found["outcome"].item() in FAILED:
         raise typer.Exit(1)

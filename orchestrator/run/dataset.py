@@ -158,6 +158,11 @@ def tally(dataset: xr.Dataset) -> dict[str, int]:
     return {Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)}
 
 
+def has_messages(dataset: xr.Dataset) -> bool:
+    """Say whether a run failed, or warns of something: either has a message."""
+    return any(dataset.variables["message"].values.tolist())
+
+
 def _described(scene: Scene, names: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     """Return the attributes that numbers of a scene have beside name and unit, by their names in the file."""
     found = {file: {"long_name": long_name} for file, long_name in _long_names(scene, names).items()}

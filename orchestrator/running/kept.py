@@ -19,11 +19,11 @@ from typing import Any
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import file_state
-from vibroimpact.orchestrator.run import Runner
+from vibroimpact.orchestrator.run import Runner, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.run.parameters import FMU_NAMES
 from vibroimpact.orchestrator.run.provenance import provenance
-from vibroimpact.orchestrator.running.opening import open_scene
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 
 MOST_KEPT = 8
@@ -100,18 +100,28 @@ if hasattr(os, "register_at_fork"):
 
 
 @contextmanager
-def opened_scene(scene: Scene) -> Iterator[OpenedScene]:
+def opened_scene(
+    scene: Scene, execution: str | None = None, runner: str = DEFAULT_RUNNER
+) -> Iterator[OpenedScene]:
     """Open a scene, or take it from those that are open; a run that fails closes it.
+
+    Parameters
+    ----------
+    scene : Scene
+    execution : str, optional
+        How its points run; by default as the scene says.
+    runner : str
+        What opens it, as `module:name`; what others than the default one open is not kept.
 
     Raises
     ------
     SceneError, ComponentError
         The scene cannot run, or a component cannot be loaded.
     """
-    key = _key(scene)
+    key = _key(scene, execution) if runner == DEFAULT_RUNNER else None
     opened = None if key is None else _kept.take(key)
     if opened is None:
-        opened = OpenedScene(scene, open_scene(scene))
+        opened = OpenedScene(scene, named_runner(scene, runner, execution))
     try:
         yield opened
     except BaseException:
@@ -123,7 +133,7 @@ def opened_scene(scene: Scene) -> Iterator[OpenedScene]:
         _kept.give_back(key, opened)
 
 
-def _key(scene: Scene) -> tuple[Any, ...] | None:
+def _key(scene: Scene, execution: str | None) -> tuple[Any, ...] | None:
     """Return what tells a scene and its components from others; None of a scene that is not kept."""
     if scene.general is not None or scene.replay is not None or scene.is_guarded:
         return None
@@ -131,7 +141,7 @@ def _key(scene: Scene) -> tuple[Any, ...] | None:
         files = tuple(file_state(path.stat()) for path in _components(FMU_NAMES[scene.body.kind]))
     except (OSError, ComponentFileError):
         return None  # who opens it says what is wrong
-    return pickle.dumps(scene), files
+    return pickle.dumps(scene), execution, files
 
 
 @cache

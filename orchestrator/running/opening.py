@@ -5,6 +5,9 @@ from __future__ import annotations
 from vibroimpact.orchestrator.run import Runner, open_runner
 from vibroimpact.orchestrator.scene import Scene
 
+DEFAULT_RUNNER = f"{__name__}:open_scene"
+"""What opens a scene, as `module:name`, so that a worker can find it by itself."""
+
 
 def open_scene(scene: Scene, *, execution: str | None = None) -> Runner:
     """Return the runner of a scene, in a guarded child process where the scene asks for it.

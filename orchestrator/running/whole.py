@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
@@ -16,7 +16,6 @@ from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import Runner
-from vibroimpact.orchestrator.run.dataset import tally
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
@@ -30,9 +29,7 @@ PROGRESS_SECONDS = 0.5
 Recorded = Sequence[RunRecord] | RunColumns
 
 
-def run_scene(
-    scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None
-) -> Mapping[str, int]:
+def run_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> xr.Dataset:
     """Run every point of a scene and write one dataset; nothing is kept when it is interrupted.
 
     Parameters
@@ -45,8 +42,8 @@ def run_scene(
 
     Returns
     -------
-    mapping of str to int
-        How many runs ended in each way.
+    xarray.Dataset
+        One-dimensional, as it is in the file.
 
     Raises
     ------
@@ -63,7 +60,7 @@ def run_scene(
         write_dataset(dataset, target)
     except OSError as error:
         raise _unwritable(target, error) from error
-    return tally(dataset)
+    return dataset
 
 
 def run_in_memory(scene: Scene, *, progress: Progress | None = None) -> xr.Dataset:

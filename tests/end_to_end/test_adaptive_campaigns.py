@@ -16,7 +16,7 @@ from support.serial_pool import campaign_here
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.jumps import jumps_of
 from vibroimpact.analysis.landmarks import ImpactOscillator, folds, period_doublings
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import load_scene
 
 FIGURE = ROOT / "examples" / "thesis" / "figure_3_3.toml"

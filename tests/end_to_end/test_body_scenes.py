@@ -17,6 +17,7 @@ from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, run_chunk
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
 from vibroimpact.orchestrator.campaign.parts import compact, list_parts
 from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
@@ -244,7 +245,10 @@ def test_a_continuation_of_a_chain_is_the_same_however_it_is_cut_into_chunks(tmp
     for first, stop in ((6, 9), (9, 12)):
         carried = run_chunk(work, Chunk(1, first, stop, carried)).carried
     compact(
-        [part.path for part in list_parts(folder, work.scene_hash, print)], tmp_path / "cut.nc", scene, {}
+        [part.path for part in list_parts(folder, work.scene_hash, print)],
+        tmp_path / "cut.nc",
+        DatasetForm(scene),
+        {},
     )
     run_scene(scene, tmp_path / "whole.nc")
     assert_same_rows(tmp_path / "cut.nc", tmp_path / "whole.nc")

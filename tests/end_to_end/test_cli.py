@@ -19,9 +19,9 @@ from support.serial_pool import campaign_here
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus import fmu_path
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.commands.cli import app, load_commands, main
 from vibroimpact.orchestrator.commands.table import PANELS
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 HEAVY = (
     *("numpy", "xarray", "pandas", "scipy", "netCDF4", "pint", "matplotlib", "dask", "distributed", "fmpy"),

@@ -19,6 +19,7 @@ from support.reference_bodies import beam_shape, period_one_orbits, uniform_chai
 
 from vibroimpact import find_orbits
 from vibroimpact.analysis import figures, open_dataset
+from vibroimpact.orchestrator.run.dataset import tally
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import load_scene
 
@@ -34,8 +35,8 @@ def run(tmp_path_factory: pytest.TempPathFactory):
     @cache
     def runner(name: str) -> xr.Dataset:
         target = folder / f"{name}.nc"
-        tally = run_scene(load_scene(FOLDER / f"{name}.toml"), target)
-        assert set(tally) <= {"ok", "stuck"}, tally
+        ends = tally(run_scene(load_scene(FOLDER / f"{name}.toml"), target))
+        assert set(ends) <= {"ok", "stuck"}, ends
         return open_dataset(target)
 
     return runner

@@ -10,8 +10,8 @@ from pathlib import Path
 from support.places import EXAMPLES
 
 from vibroimpact.fmus.errors import ComponentError, SceneError
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand
 

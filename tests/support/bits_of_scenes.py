@@ -24,7 +24,7 @@ from support.scenes import BEAM, CHAIN, FORCED, YIELDING
 from support.serial_pool import campaign_here
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.shipped import package_folder
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
 KEPT = Path(__file__).with_suffix(".json")

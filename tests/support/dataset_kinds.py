@@ -27,7 +27,7 @@ from support.rig_bench import opened_bench
 from support.scenes import BEAM, CHAIN, FORCED
 from support.serial_pool import campaign_here
 from support.sweep_files import sweep_text
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 FREQUENCIES = "[sweep]\n'forcing.angular_frequency' = { start = 0.7, stop = 0.9, points = 3%s }\n"
 SCENES = {

@@ -14,8 +14,8 @@ from support.serial_pool import campaign_here
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import constant_names, merge_datasets, with_constants, write_dataset
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.running import run_scene
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 SCENE = """
 [body]

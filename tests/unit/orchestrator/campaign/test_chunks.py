@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.campaign.parts import (
 )
 from vibroimpact.orchestrator.campaign.schedule import gaps_between
 from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.scene.sweep import expand
 
 BUSY = "support.busy_runner:BusyRunner"
@@ -55,8 +56,8 @@ def test_rows_do_not_depend_on_how_runs_are_cut_into_chunks(tmp_path: Path, path
     stops = [*cut[1:], runs]
     fine = run_all(work_in(tmp_path / "fine", text), list(zip(cut, stops, strict=True)), length)
     coarse = run_all(work_in(tmp_path / "coarse", text), [(0, runs)], length)
-    compact(fine, tmp_path / "fine.nc", scene_of(text), {})
-    compact(coarse, tmp_path / "coarse.nc", scene_of(text), {})
+    compact(fine, tmp_path / "fine.nc", DatasetForm(scene_of(text)), {})
+    compact(coarse, tmp_path / "coarse.nc", DatasetForm(scene_of(text)), {})
     assert_same_rows(tmp_path / "fine.nc", tmp_path / "coarse.nc")
     assert read_flat(tmp_path / "fine.nc").attrs == read_flat(tmp_path / "coarse.nc").attrs
     run_busy(scene_of(text), tmp_path / "run.nc")
@@ -89,7 +90,7 @@ def test_a_failed_run_hands_on_the_state_it_was_given() -> None:
 def test_a_chunk_of_failed_runs_merges_with_any_other(tmp_path: Path) -> None:
     work = work_in(tmp_path / "parts", amplitude_text(20, start=-0.9), "support.busy_runner:BrittleRunner")
     paths = run_all(work, [(0, 5), (5, 20)], 20)
-    compact(paths, tmp_path / "all.nc", work.scene, {})
+    compact(paths, tmp_path / "all.nc", DatasetForm(work.scene), {})
     outcome = read_flat(tmp_path / "all.nc")["outcome"].values
     assert (outcome[:10] == Outcome.error).all()
     assert (outcome[10:] == Outcome.ok).all()

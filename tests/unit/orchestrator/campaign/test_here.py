@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.busy_runner import run_busy
@@ -14,9 +15,14 @@ from support.serial_pool import SerialPool, campaign_here
 import vibroimpact.orchestrator.campaign.campaign as campaign
 import vibroimpact.orchestrator.campaign.here as here
 import vibroimpact.orchestrator.campaign.schedule as schedule
+from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, ChunkResult, Work
+from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work
+from vibroimpact.orchestrator.run import PointRunner, Runner
+from vibroimpact.orchestrator.running import kept
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 
 BUSY = "support.busy_runner:BusyRunner"
@@ -147,9 +153,40 @@ def test_what_may_take_this_process_down_or_hold_it_up_does_not_begin_in_it() ->
 
 
 def test_two_campaigns_of_one_process_do_not_share_what_is_open(tmp_path: Path) -> None:
-    work = Work(scene_of(frequency_text(3)), str(tmp_path), BUSY)
+    work = Work(scene_of(frequency_text(3)), str(tmp_path))
     with here.opened_here(work) as first, here.opened_here(work) as second:
         assert first is not None
         assert second is None
     with here.opened_here(work) as again:
         assert again == first
+
+
+def test_a_scene_stays_open_for_the_next_campaign_unless_a_point_failed(
+    tmp_path: Path, opened: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Scene] = []
+    make = kept.named_runner
+
+    def noted(scene: Scene, runner: str, execution: str | None) -> Runner:
+        made.append(scene)
+        return make(scene, runner, execution)
+
+    monkeypatch.setattr(kept, "named_runner", noted)
+    scene = scene_of(frequency_text(3, milliseconds=1.0078125))
+    for name in ("first", "second"):
+        run(scene, tmp_path / name, DEFAULT_RUNNER)
+    assert_same_rows(tmp_path / "second" / "dataset.nc", tmp_path / "first" / "dataset.nc")
+    assert len(made) == 1
+    rows = PointRunner.rows
+
+    def broken(runner: PointRunner, *arguments: Any) -> tuple[RunColumns, object]:
+        records, carried = rows(runner, *arguments)
+        assert isinstance(records, RunColumns)
+        records.outcome[:], records.message[:] = Outcome.error, "broken"
+        return records, carried
+
+    with monkeypatch.context() as patch:
+        patch.setattr(PointRunner, "rows", broken)
+        run(scene, tmp_path / "third", DEFAULT_RUNNER)
+    run(scene, tmp_path / "fourth", DEFAULT_RUNNER)
+    assert len(made) == 2

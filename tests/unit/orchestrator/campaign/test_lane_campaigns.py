@@ -16,9 +16,9 @@ import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.campaign.manifest import read_manifest, write_manifest
 from vibroimpact.orchestrator.run.point import ENGINE
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 BODY = """
 [body]

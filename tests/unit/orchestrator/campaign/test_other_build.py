@@ -16,8 +16,8 @@ import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis.dataset import Outcome, read_flat, write_dataset
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.campaign.manifest import read_manifest, scene_hash, write_manifest
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 BEGAN, OTHER = "support.busy_runner:SceneRunner", "support.busy_runner:OtherBuildRunner"
 INDEPENDENT, UP = frequency_text(40, milliseconds=0.001), frequency_text(40, "up", milliseconds=0.001)

@@ -15,8 +15,8 @@ from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.analysis.jumps import jumps_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.running import run_scene
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import parse_scene
 
 BODY = """
