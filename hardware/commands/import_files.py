@@ -52,13 +52,7 @@ def _settings_of(options: ImportFiles) -> ImportSettings:
 
 
 def _span(text: str, option: str) -> list[float]:
-    """Return start and end of a span of time, s.
-
-    Raises
-    ------
-    UsageError
-        The text is not START:END.
-    """
+    """Return start and end of a span of time START:END, s; another text raises UsageError."""
     try:
         begin, end = map(float, text.split(":"))
     except ValueError:

@@ -22,30 +22,20 @@ INTERVALS = frozenset({"dt", "ts", "deltat", "delta_t", "sampling_interval", "sa
 
 @dataclass(slots=True)
 class Scope:
-    """A structure or group: its numeric arrays by name, and what it says of their clock.
-
-    Attributes
-    ----------
-    path : str
-        Names of the structures around it with dots between; empty for the file itself.
-    arrays : dict
-        Numeric arrays by their own names.
-    units : dict
-        Unit labels, by the names of arrays that have one.
-    rate : float or None
-        Samples per second of all its arrays.
-    around : Scope or None
-        What it lies in; its clock holds here too where there is none.
-    numbers : int
-        Numbers that were read into the outermost structure and all within it; kept where reading stops at a limit.
-    """
+    """A structure or group: its numeric arrays by name, and what it says of their clock."""
 
     path: str = ""
+    """Names of the structures around it with dots between; empty for the file itself."""
     arrays: dict[str, Any] = field(default_factory=dict)
+    """Numeric arrays by their own names."""
     units: dict[str, str] = field(default_factory=dict)
+    """Unit labels, by the names of arrays that have one."""
     rate: float | None = None
+    """Samples per second of all its arrays."""
     around: Scope | None = None
+    """What it lies in; its clock holds here too where there is none."""
     numbers: int = 0
+    """Numbers read into the outermost structure and all within it; kept where reading stops at a limit."""
 
     def within(self, name: str) -> Scope:
         """Return a structure of this name that lies in this one."""
@@ -66,12 +56,7 @@ def tables_of(scopes: Sequence[Scope]) -> tuple[list[Table], list[str]]:
     """Make a table of the arrays of each structure, the outer ones first.
 
     A vector named `t` or `time` has the instants, a number named `fs` or `dt` the rate; both hold in the structures
-    within, too, where those have none.
-
-    Raises
-    ------
-    DatasetError
-        There are more columns or samples than one import takes.
+    within, too, where those have none. More columns or samples than one import takes raise DatasetError.
     """
     remarks: list[str] = []
     if sum(array.size for scope in scopes for array in scope.arrays.values()) > MOST_SAMPLES:

@@ -25,10 +25,7 @@ SIGNATURES = (PARQUET, FEATHER, _OLD_FEATHER)
 def read_arrow(path: os.PathLike[str] | str) -> RawFile:
     """Read a Parquet or Feather file: its columns of numbers, one of dates as instants.
 
-    Raises
-    ------
-    DatasetError
-        pyarrow is not installed, the file is damaged, of the first version of Feather, or too large.
+    DatasetError: pyarrow is not installed, or the file is damaged, too large, or of the first version of Feather.
     """
     with open(path, "rb") as stream:
         start = stream.read(len(FEATHER))

@@ -92,12 +92,8 @@ def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str, dates:
     """Return the columns of rows of cells, without labels, each up to its last cell that is not empty.
 
     Cells are separated by the delimiter, by blanks where it is None. `dates` is the order of day and month; empty: it
-    is found. A column of days beside one of times of day gives them their dates, and is empty.
-
-    Raises
-    ------
-    DatasetError
-        There are more columns, or more cells, than one import takes.
+    is found. A column of days beside one of times of day gives them their dates, and is empty. More columns or cells
+    than one import takes raise DatasetError.
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
@@ -202,8 +198,6 @@ def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Colum
 
     `facts` is what else is known of the column, by the names of its attributes.
 
-    Examples
-    --------
     >>> column = column_of("base", np.array([1.0, 9.9e37, 9.91e37, -np.inf]))
     >>> column.values, column.overrange
     (array([ 1., nan, nan, nan]), array([False,  True, False,  True]))

@@ -107,10 +107,7 @@ def _has_word_of_netcdf(path: Path) -> bool:
 def read_raw(path: Path, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
     """Read a file of any format known here, one that `check_file` has passed; the rest is for `text.read_text`.
 
-    Raises
-    ------
-    DatasetError
-        The file is none of the formats, or is damaged.
+    An unknown format or a damaged file raises DatasetError.
     """
     with path.open("rb") as file:
         start = file.read(512)

@@ -68,10 +68,7 @@ def packed(raw: RawFile) -> tuple[dict[str, Any], list[Any]]:
 def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> RawFile:
     """Return the file that `packed` has taken apart.
 
-    Raises
-    ------
-    ValueError, TypeError, KeyError, IndexError
-        It is none of that.
+    Other facts raise ValueError, TypeError, KeyError or IndexError.
     """
     arrays = [
         np.frombuffer(buffer, dtype=_kind(text)) for buffer, text in zip(buffers, facts["kinds"], strict=True)
@@ -104,13 +101,7 @@ def packed_datasets(
 def unpacked_datasets(
     facts: Mapping[str, Any], buffers: Sequence[bytearray]
 ) -> tuple[list[int], list[dict[str, Any]], bool]:
-    """Return what `packed_datasets` has taken apart.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError, IndexError
-        It is none of that.
-    """
+    """Return what `packed_datasets` has taken apart. Other facts raise errors as in `unpacked`."""
     datasets = [
         {str(key): _value_in(value, buffers) for key, value in one.items()} for one in facts["datasets"]
     ]

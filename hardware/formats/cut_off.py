@@ -26,14 +26,12 @@ def without_cut_cells(
 ) -> tuple[list[str], list[str]]:
     """Return the rows of a table without what was cut off, and remarks on it.
 
-    Where the text has no final line break, its last cell counts as missing if it is not written as all cells
-    above it, or, where those differ from each other, if it is shorter than all of them or in a row that lacks cells; so
-    do the cells that the row has less than the one before. A row of which nothing else is left is dropped.
+    Where the text has no final line break, its last cell counts as missing if it is not written as all cells above it,
+    or, where those differ from each other, if it is shorter than all of them or in a row that lacks cells; so do the
+    cells that the row has less than the one before. A row of which nothing else is left is dropped.
 
     The rows are the last ones of the text `content`; cells are separated by the delimiter, by blanks where it is None.
 
-    Examples
-    --------
     >>> without_cut_cells(["0.1,0.45", "0.2,0.6"], "0.1,0.45\\n0.2,0.6", ",", ".")
     (['0.1,0.45', '0.2,nan'], ["the text ends within a row: its last value, '0.6', counts as missing"])
     """

@@ -26,10 +26,7 @@ _SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<date>.+)")
 def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
     """Read the numeric variables of one dimension; a table for each dimension.
 
-    Raises
-    ------
-    DatasetError
-        The file is damaged, or has no such variables.
+    A damaged file, or one without such variables, raises DatasetError.
     """
     with one_refusal("a whole NetCDF file"):
         with open(path, "rb") as file:

@@ -51,12 +51,8 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
 def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     """Read the numeric datasets of an HDF5 file by the dotted names of their groups.
 
-    In a MATLAB file of version 7.3 the dimensions are the other way round, and groups are structures.
-
-    Raises
-    ------
-    DatasetError
-        h5py is not installed, the file is damaged, or promises too much.
+    In a MATLAB file of version 7.3 the dimensions are the other way round, and groups are structures. DatasetError:
+    h5py is not installed, or the file is damaged or promises too much.
     """
     what = "a MATLAB file of version 7.3" if matlab else "an HDF5 file"
     try:

@@ -158,15 +158,8 @@ def read_instants(cells: Sequence[str], is_marker: Callable[[str], bool], order:
     """Return cells of dates and times of day as seconds after the first one.
 
     Where dates such as 02/03/2019 have their instants both with the day and with the month first, and the two differ,
-    the column says so in `doubt`.
-
-    Parameters
-    ----------
-    cells : sequence of str
-    is_marker : callable
-        Whether a cell stands for a sample that is not there.
-    order : str
-        `day-first` or `month-first`; empty: found from the dates.
+    the column says so in `doubt`. `is_marker` tells whether a cell stands for a missing sample. `order` is `day-first`
+    or `month-first`; empty: found from the dates.
     """
     read = _read(cells, is_marker, order or DAY_FIRST)
     known = _seconds(read.stamps, cells)

@@ -29,58 +29,42 @@ _NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d{1,3})?", re.AS
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One export of a maker. Texts are regular expressions over lines; their first group is what is taken.
-
-    Attributes
-    ----------
-    signature : sequence of str
-        All of them are found in an export of this form.
-    delimiter, decimal : str
-        As the options of the same names; empty: found from the rows.
-    replaced : sequence of (expression, text)
-        What is written otherwise before the rows are read.
-    first_column : int
-        Cells before this one are settings beside the rows; 1 is the first.
-    headings, names, units, time_unit : str
-        Headings of all columns; names and units of the last ones; unit of the instants.
-    unit_words : dict
-        The maker's words for units.
-    headings_are_units : bool
-        A heading that is a unit alone is the unit of its column.
-    time : str
-        Heading of the instants.
-    time_column : int
-        Place of the instants where no heading says so; 1 is the first.
-    interval, rate, start : str
-        Numbers in the header: the second group is their unit, where there is one.
-    counts : bool
-        The first column counts the samples.
-    left_out : str
-        Headings of columns that are no measurements.
-    pairs : bool
-        Columns are pairs of instants and values.
-    """
+    """One export of a maker; texts are regular expressions over lines, whose first group is taken."""
 
     maker: str
     signature: Sequence[str]
+    """All of them are found in an export of this form."""
     delimiter: str = ""
     decimal: str = ""
+    """As the options of these names; empty: found from the rows."""
     replaced: Sequence[Sequence[str]] = ()
+    """Pairs of an expression and a text, which replaces it before the rows are read."""
     first_column: int = 1
+    """Cells before this one are settings beside the rows; 1 is the first."""
     headings: str = ""
+    """Headings of all columns."""
     names: str = ""
     units: str = ""
+    """Names and units are those of the last columns."""
     time_unit: str = ""
     unit_words: Mapping[str, str] = field(default_factory=dict)
+    """The maker's words for units."""
     headings_are_units: bool = False
+    """A heading that is a unit alone is the unit of its column."""
     time: str = ""
+    """Heading of the instants."""
     time_column: int = 0
+    """Place of the instants where no heading says so; 1 is the first."""
     interval: str = ""
     rate: str = ""
     start: str = ""
+    """`interval`, `rate` and `start` are numbers in the header; the second group is their unit, where there is one."""
     counts: bool = False
+    """The first column counts the samples."""
     left_out: str = ""
+    """Headings of columns that are no measurements."""
     pairs: bool = False
+    """Columns are pairs of instants and values."""
 
 
 @lru_cache(maxsize=1)
@@ -134,13 +118,7 @@ class Instrument:
         return mark.join(cells[first - 1 :]) if is_row else line
 
     def described(self, columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
-        """Return columns with the names, units and clock that the form has for them, and remarks.
-
-        Parameters
-        ----------
-        columns : sequence of Column
-            As the general reader names them, those without cells too.
-        """
+        """Return columns, as the general reader names them, with names, units and clock of the form, and remarks."""
         named = self._with_headings(columns)
         filled = [column for column in named if len(column.values)]
         left_out = [column.label for column in filled if self._has(self.form.left_out, column.label)]

@@ -39,13 +39,7 @@ class _Segment:
 
 
 def read_labview(content: str) -> RawFile:
-    """Read a LabVIEW measurement file.
-
-    Raises
-    ------
-    DatasetError
-        The header does not end, or there are no rows.
-    """
+    """Read a LabVIEW measurement file. A header without end, or no rows, raises DatasetError."""
     lines, special = _without_special_blocks(content.splitlines())
     separator = _separator(lines)
     header, after = _header(lines, 0, separator)

@@ -23,16 +23,8 @@ def read_pieces(
 ) -> Floats | None:
     """Return all columns of a full table of plain numbers, shape (column, row); None where it is not one.
 
-    Parameters
-    ----------
-    content : str
-    begin : int
-        Place of the first row.
-    delimiter : str or None
-        Between cells; None: blanks.
-    decimal : str
-    last_lines : callable
-        Returns the lines of the last piece as they are to be read: the text may be cut off.
+    The first row begins at `begin`; no delimiter: blanks. `last_lines` returns the lines of the last piece as they are
+    to be read: the text may be cut off.
     """
     if decimal == delimiter:
         return None

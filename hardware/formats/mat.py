@@ -39,12 +39,8 @@ _CELL, _STRUCTURE, _OBJECT = 1, 2, 3
 def read_mat(path: os.PathLike[str] | str) -> RawFile:
     """Read a MATLAB file of version 4 to 7: its numeric arrays, and those in its structures by dotted names.
 
-    A vector of instants (`t`, `time`) beside others makes them channels; `fs` or `dt` gives their rate.
-
-    Raises
-    ------
-    DatasetError
-        The file is damaged, or has no arrays of numbers.
+    A vector of instants (`t`, `time`) beside others makes them channels; `fs` or `dt` gives their rate. A damaged file,
+    or one without arrays of numbers, raises DatasetError.
     """
     from scipy.io import loadmat, whosmat
 

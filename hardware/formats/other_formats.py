@@ -65,15 +65,8 @@ OTHERS = (
 
 
 def refuse_other_format(start: bytes) -> None:
-    """Refuse a file that begins as one of a format that is not read here.
+    """Raise DatasetError, with the format and a package that reads it, if a file begins as one that is not read here.
 
-    Raises
-    ------
-    DatasetError
-        With the name of the format, and of a package that reads it.
-
-    Examples
-    --------
     >>> refuse_other_format(b"# time, force")
     >>> [other.package for other in OTHERS if other.begins(b"MDF     4.10    ")]
     ['asammdf']

@@ -19,12 +19,9 @@ class UnreadableError(DatasetError):
 
 
 def check_reads(path: os.PathLike[str] | str) -> None:
-    """Refuse a NetCDF file that the library cannot read; see `analysis.files.probing`.
+    """Raise UnreadableError, which the importer gives the file's name, if the library cannot read a NetCDF file.
 
-    Raises
-    ------
-    UnreadableError
-        Without the name of the file, which the importer puts before it.
+    See `analysis.files.probing`.
     """
     try:
         check_sound(path)
@@ -37,15 +34,8 @@ def check_reads(path: os.PathLike[str] | str) -> None:
 
 @contextmanager
 def one_refusal(what: str) -> Iterator[None]:
-    """Turn what a library raises on a damaged file, errors of every kind and MemoryError too, into one refusal.
+    """Turn what a library raises on a damaged file, MemoryError too, into one DatasetError.
 
-    Raises
-    ------
-    DatasetError
-        Of any other exception within.
-
-    Examples
-    --------
     >>> with one_refusal("a whole MATLAB file"):
     ...     raise KeyError("t")
     Traceback (most recent call last):

@@ -63,12 +63,9 @@ def read_file(path: Path, **options: Any) -> RawFile:
 
 
 def read_datasets_apart(path: Path, wanted: frozenset[int]) -> tuple[list[int], list[dict[str, Any]], bool]:
-    """Return what `uff.read_datasets` finds in a universal file, read in a process of its own.
+    """Return what `uff.read_datasets` finds in a universal file, read in another process.
 
-    Raises
-    ------
-    DatasetError
-        As `read_file`.
+    Errors are those of `read_file`.
     """
     return _read_apart(path, _READER_OF_DATASETS, {"wanted": sorted(wanted)}, unpacked_datasets)
 

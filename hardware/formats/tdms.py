@@ -41,10 +41,7 @@ _EPOCH_ENDS = np.datetime64("1904-01-02")
 def read_tdms(path: os.PathLike[str] | str) -> RawFile:
     """Read a TDMS file: a table for each group.
 
-    Raises
-    ------
-    DatasetError
-        The file is damaged, or has no channels of numbers.
+    A damaged file, or one without channels of numbers, raises DatasetError.
     """
     from nptdms import TdmsFile
 

@@ -89,20 +89,8 @@ class Dialect:
 def read_text(content: str, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
     """Read a table of text, as its instrument writes it where a form of `dialects/` is recognised.
 
-    Parameters
-    ----------
-    content : str
-    delimiter : str or None
-        Between cells; None: blanks; empty: found from the rows.
-    decimal : str
-        Decimal sign; empty: found from the rows.
-    dates : str
-        `day-first` or `month-first`; empty: found from the dates.
-
-    Raises
-    ------
-    DatasetError
-        There are no rows of numbers.
+    The delimiter stands between cells (None: blanks), `dates` is `day-first` or `month-first`; what is empty is found
+    from the rows. Without rows of numbers DatasetError is raised.
     """
     content = with_plain_numbers(content)
     instrument = instrument_of(content)

@@ -57,10 +57,7 @@ def is_uff(start: bytes) -> bool:
 def read_uff(path: os.PathLike[str] | str) -> RawFile:
     """Read the functions over time of a universal file; those with one set of instants share a table.
 
-    Raises
-    ------
-    DatasetError
-        pyuff is not installed, the file is damaged, or has no function over time.
+    DatasetError: pyuff is not installed, or the file is damaged or has no function over time.
     """
     types, datasets, cut = read_datasets(path, frozenset({_FUNCTION, _UNITS}))
     functions = [found for found in datasets if found["type"] == _FUNCTION]
@@ -75,10 +72,7 @@ def read_datasets(
 ) -> tuple[list[int], list[Mapping[str, Any]], bool]:
     """Return the types of all datasets, those of the wanted types as pyuff reads them, and whether the file is cut off.
 
-    Raises
-    ------
-    DatasetError
-        pyuff is not installed, or the file is damaged.
+    Without pyuff, and for a damaged file, DatasetError is raised.
     """
     try:
         import pyuff

@@ -26,10 +26,7 @@ _CUT_OFF = "the file is cut off: it holds less samples than it declares, and wha
 def read_wav(content: bytes) -> RawFile:
     """Read the bytes of a WAV file: a column for each of its channels.
 
-    Raises
-    ------
-    DatasetError
-        The file is damaged, compressed, or holds no samples.
+    A damaged, compressed or empty file raises DatasetError.
     """
     from scipy.io import wavfile
 
@@ -76,10 +73,7 @@ class _Samples:
 def _samples_of(content: bytes) -> _Samples:
     """Return where the samples are; scipy says what is wrong where they cannot be found.
 
-    Raises
-    ------
-    DatasetError
-        The file has more parts than any program writes.
+    More parts than any program writes raise DatasetError.
     """
     order, place, frame, bits = (">" if content.startswith(b"RIFX") else "<"), 12, 0, 0
     found: _Samples | None = None

@@ -28,28 +28,18 @@ _NO_EVENTS = Argument("events", False)
 
 @dataclass(slots=True)
 class Parts:
-    """What the recording is made of, growing from column to column.
-
-    Attributes
-    ----------
-    channels, events, scalars : dict
-        By name.
-    remarks : dict of str to None
-        In the order in which they were noticed, each once.
-    """
+    """What the recording is made of, growing from column to column; each by its name."""
 
     channels: dict[str, Channel] = field(default_factory=dict)
     events: dict[str, EventTrain] = field(default_factory=dict)
     scalars: dict[str, SingleValue] = field(default_factory=dict)
     remarks: dict[str, None] = field(default_factory=dict)
+    """In the order in which they were noticed, each once."""
 
     def add(self, source: Source, title: str) -> None:
         """Add the columns of one file, whose remarks begin with a title; empty for one file alone.
 
-        Raises
-        ------
-        DatasetError
-            A column cannot be placed in time; the message has the name of the file.
+        A column that cannot be placed in time raises DatasetError with the name of the file.
         """
         tables = source.raw.tables
         self.remark(source.raw.remarks, title)

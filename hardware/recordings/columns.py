@@ -20,12 +20,8 @@ NO_COLUMN = "none"
 def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
     """Return the tables of a file with the columns that the user wants, instants told apart and in s.
 
-    Numbers of columns count from 1 through all columns of all tables, the instants with them where they stand.
-
-    Raises
-    ------
-    DatasetError
-        A column that the user names is not there, or the instants may be others.
+    Numbers of columns count from 1 through all columns of all tables, the instants with them where they stand. A
+    missing column that the user names, or doubtful instants, raise DatasetError.
     """
     tables = list(raw.tables)
     numbered = [column for table in tables for column in _in_file_order(table)]

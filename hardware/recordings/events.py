@@ -94,12 +94,8 @@ def event_train(
 ) -> tuple[EventTrain, list[str]]:
     """Make an event train of a column of instants, s, and say what was noticed.
 
-    It was observed in the window (from, to, s), but for the parts that are masked, s.
-
-    Raises
-    ------
-    DatasetError
-        There are no instants, or they lie outside the window.
+    It was observed in the window (from, to, s), but for the parts that are masked, s. No instants, or instants outside
+    the window, raise DatasetError.
     """
     times, remarks = _ascending(name, column)
     if window is not None:

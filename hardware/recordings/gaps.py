@@ -20,25 +20,17 @@ _GAP = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Where instants skip samples.
-
-    Attributes
-    ----------
-    row : ndarray of int, shape (gap,)
-        First row after each gap.
-    skipped : ndarray of int, shape (gap,)
-        Samples that are missing before it.
-    at, length : float
-        Start and length of the longest gap, s.
-    on_grid : bool
-        The rows between the gaps are evenly spaced.
-    """
+    """Where instants skip samples."""
 
     row: NDArray[np.intp]
+    """First row after each gap, shape (gap,)."""
     skipped: NDArray[np.intp]
+    """Samples that are missing before it, shape (gap,)."""
     at: float
     length: float
+    """The longest gap starts `at`, s, and has this length, s."""
     on_grid: bool
+    """The rows between the gaps are evenly spaced."""
 
     @property
     def missing(self) -> int:
@@ -68,17 +60,9 @@ class Gaps:
 def gaps_in(row: NDArray[np.intp], instants: Floats, interval: float | None = None) -> Gaps | None:
     """Return the gaps in the instants of rows, s; None where there are none.
 
-    Each run of rows between gaps has a start, averaged over its instants; two starts tell how many samples are
-    missing between their runs, also where the digits of one instant do not. Steps may differ by any factor.
-
-    Parameters
-    ----------
-    row : ndarray of int
-        Rows that have an instant.
-    instants : ndarray of float
-        Of these rows.
-    interval : float or None
-        Sampling interval by the user, s; used where the instants do not contradict it.
+    Each run of rows between gaps has a start, averaged over its instants; two starts tell how many samples are missing
+    between their runs, also where the digits of one instant do not. Steps may differ by any factor. `interval` is the
+    user's sampling interval, s, used where the instants do not contradict it.
     """
     if len(row) < 3:
         return None

@@ -18,8 +18,6 @@ def decimal_step(values: Floats) -> float:
 
     It is 0 where they have more digits than can be told from rounding in binary.
 
-    Examples
-    --------
     >>> decimal_step(np.array([0.05, 0.1, 0.151])), decimal_step(np.arange(5) / 3)
     (0.001, 0.0)
     """
@@ -50,21 +48,12 @@ def digits_of(instants: Floats) -> float:
 
 
 def common_step(intervals: Floats, digits: float) -> float:
-    """Return the coarsest step that nearly all intervals are multiples of, up to their digits; 0 where none is.
+    """Return the coarsest step that nearly all intervals (s) are multiples of, up to their digits; 0 where none is.
 
-    Instants that were read off frames (of video, of blocks of audio) lie on such a step. The mean of
-    exp(2 pi i d / step) over the intervals d has modulus 1 for it. The largest such step is chosen, and refined by
-    least squares, d = step * whole number.
+    Instants that were read off frames (of video, of blocks of audio) lie on such a step. The mean of exp(2 pi i d /
+    step) over the intervals d has modulus 1 for it. The largest such step is chosen, and refined by least squares, d =
+    step * whole number. `digits` is the weight of their last digit, s.
 
-    Parameters
-    ----------
-    intervals : ndarray of float, shape (interval,)
-        s, positive.
-    digits : float
-        Weight of their last digit, s.
-
-    Examples
-    --------
     >>> frames = np.random.default_rng(1).integers(14, 22, 3000) * 1024 / 44100
     >>> round(common_step(np.round(frames, 3), 1e-3), 4)
     0.0232

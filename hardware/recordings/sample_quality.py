@@ -19,17 +19,10 @@ _SMOOTH_TOP = 6.0
 def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) -> Flags:
     """Return which samples are at the limit of the measuring chain.
 
-    A limit shows as its extreme value coming again and again, exactly, and more often than its neighbours in
-    value, where the signal arrives too steeply for a smooth top that the converter's steps make flat.
+    A limit shows as its extreme value coming again and again, exactly, and more often than its neighbours in value,
+    where the signal arrives too steeply for a smooth top that the converter's steps make flat. `rails` are the limits
+    of the converter, where the file tells them: every sample there is clipped.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-    rails : tuple of float or None
-        What the converter can give at most, where the file tells: then every sample there is clipped.
-
-    Examples
-    --------
     >>> t = np.linspace(0.0, 1.0, 500)
     >>> int(clipped_samples(np.clip(np.sin(40 * t) * np.exp(-t), -0.7, 2.0)).sum()) > 20
     True

@@ -26,20 +26,13 @@ _PER_COLUMN = frozenset({"name", "unit", "scale", "offset"})
 
 @dataclass(slots=True)
 class Source:
-    """One file: what was read of it, and what the user says of it.
-
-    Attributes
-    ----------
-    path : Path
-    settings : ImportSettings
-        Its lists go through the columns of this file.
-    raw : RawFile
-        With the columns that are wanted, instants in s.
-    """
+    """One file: what was read of it, and what the user says of it."""
 
     path: Path
     settings: ImportSettings
+    """Its lists go through the columns of this file."""
     raw: RawFile
+    """With the columns that are wanted, instants in s."""
 
     @property
     def columns(self) -> int:
@@ -51,12 +44,7 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     """Read one file and choose its columns.
 
     `given` are the settings of the command line, of which those for single columns are left to `spread`; `common` those
-    in place of the settings file beside the file.
-
-    Raises
-    ------
-    DatasetError
-        The file cannot be read; the message has its name.
+    in place of the settings file beside the file. A file that cannot be read raises DatasetError with its name.
     """
     own = settings_beside(path) if common is None else common
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
@@ -86,10 +74,7 @@ def shortened(line: str) -> str:
 def naming(path: Path, besides: str = "") -> Iterator[None]:
     """Let the lines of an error begin with the name of their file, and end with what else is wrong with it.
 
-    Raises
-    ------
-    DatasetError
-        Of one within, of a file that cannot be read, and of one too large for the memory.
+    The DatasetError is also that of a file that cannot be read, or is too large for the memory.
     """
     try:
         yield
@@ -111,10 +96,7 @@ def naming(path: Path, besides: str = "") -> Iterator[None]:
 def spread(sources: Sequence[Source], given: ImportSettings) -> None:
     """Hand what the command line says of the columns, in order, to the files that they are in.
 
-    Raises
-    ------
-    UsageError
-        There are fewer columns than names, units, scales or offsets.
+    Fewer columns than names, units, scales or offsets raise UsageError.
     """
     edges = np.cumsum([0, *(source.columns for source in sources)]).tolist()
     for key in sorted(_PER_COLUMN & given.model_fields_set):

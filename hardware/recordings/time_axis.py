@@ -32,21 +32,13 @@ _MOST_FILLED = 10
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where the rows of a column go in time.
-
-    Attributes
-    ----------
-    axis : TimeAxis
-    row : ndarray of int, shape (sample,)
-        Row of the file that each sample has; -1 for one that is missing there.
-    suspect : ndarray of bool, shape (sample,)
-        Its instant was doubtful.
-    remarks : tuple of str
-    """
+    """Where the rows of a column go in time."""
 
     axis: TimeAxis
     row: NDArray[np.intp]
+    """Row of the file that each sample has, shape (sample,); -1 for one that is missing there."""
     suspect: Flags
+    """Samples whose instant was doubtful, shape (sample,)."""
     remarks: tuple[str, ...] = ()
 
     @property
@@ -58,24 +50,11 @@ class Placement:
 def place(
     table: Table, column: Column, rate: float | None = None, start: float | None = None, trigger: str = ""
 ) -> Placement:
-    """Decide the instants of one column of a table.
+    """Decide the instants of one column of a table, whose own column of instants, if it has one, is in s.
 
-    Parameters
-    ----------
-    table : Table
-        With its column of instants in s, if it has one.
-    column : Column
-    rate : float or None
-        Samples per second by the user, who knows better than the file.
-    start : float or None
-        Instant of the first sample by the user, s.
-    trigger : str
-        Which trigger began the axis.
-
-    Raises
-    ------
-    DatasetError
-        Nothing says when the samples were taken, or what says so is in disorder.
+    `rate` (samples per second) and `start` (instant of the first sample, s) are the user's, who knows better than the
+    file; `trigger` is what began the axis. DatasetError: nothing says when the samples were taken, or what says so is
+    in disorder.
     """
     placement = _placed(table, column, rate)
     time = placement.axis.time

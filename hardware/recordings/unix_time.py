@@ -61,10 +61,7 @@ def counted_from_start(
 def _in_seconds_of_days(tables: Sequence[Table]) -> tuple[Sequence[Table], str]:
     """Return tables whose instants were days of a spreadsheet in s, and the date of the first; no date, if none were.
 
-    Raises
-    ------
-    DatasetError
-        They may be days, or seconds.
+    Instants that may be days or seconds raise DatasetError.
     """
     found = [table.time for table in tables if table.time is not None and _are_days(table.time)]
     if not found:
@@ -89,10 +86,7 @@ def _in_seconds_of_days(tables: Sequence[Table]) -> tuple[Sequence[Table], str]:
 def _are_days(time: Column) -> bool:
     """Whether instants without a unit are days of a spreadsheet: as seconds they would be odd, as days they are not.
 
-    Raises
-    ------
-    DatasetError
-        They may be either.
+    Instants that may be either raise DatasetError.
     """
     known = time.values[np.isfinite(time.values)]
     if time.unit or time.dated or len(known) < 3 or known[0] < _FIRST_DAY or known[-1] > _LAST_DAY:
