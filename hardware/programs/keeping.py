@@ -40,17 +40,7 @@ _GAP, _COUNT = TypeAdapter(Gap), TypeAdapter(int)
 class Store:
     """Where samples are kept: a journal, or memory; and in memory what a journal no longer takes.
 
-    Parameters
-    ----------
-    header : mapping
-    journal : Journal or None
-
-    Attributes
-    ----------
-    failure : str
-        Why the journal takes no more; empty where it does.
-    kept : int
-        Samples of each input.
+    `failure` is why the journal takes no more (empty where it does), `kept` the number of samples of each input.
     """
 
     def __init__(self, header: Mapping[str, Any], journal: Journal | None) -> None:
@@ -95,18 +85,9 @@ class Store:
 def keep_all(
     acquired: Acquisition, store: Store, progress: Progress, finder: PulseFinder | None, most: int | None
 ) -> Exception | None:
-    """Keep what an acquisition gives, until it ends; return what it failed with.
+    """Keep what an acquisition, not started yet, gives until it ends; return what it failed with.
 
-    Parameters
-    ----------
-    acquired : Acquisition
-        Not started yet.
-    store : Store
-    progress : Progress
-    finder : PulseFinder or None
-        Chooses what is kept; None: all of it.
-    most : int or None
-        Samples of each input after which it ends.
+    The finder chooses what is kept (None: all of it); it ends after `most` samples of each input.
     """
     acquired.start()
     store.note(started_at=acquired.facts.started_at)
@@ -202,20 +183,9 @@ class _Keeper:
 
 
 def recording_in(content: JournalContent, source: str) -> Recording:
-    """Return the recording of what was kept.
+    """Return the recording of what was kept; messages call it `source`.
 
-    Parameters
-    ----------
-    content : JournalContent
-    source : str
-        What messages call it.
-
-    Raises
-    ------
-    DatasetError
-        It is that of another version.
-    RigError
-        There are too few samples, or no pulses.
+    Another version raises DatasetError; too few samples, or no pulses, raise RigError.
     """
     measurement = measurement_in(content.header, source)
     notes = {key: value for each in content.notes for key, value in each.items()}

@@ -33,25 +33,16 @@ UNKNOWN_DURATION = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """Which inputs are measured, how fast and how long.
-
-    Attributes
-    ----------
-    inputs : tuple of Input
-    loopbacks : frozenset of str
-        Names of those to which an output is wired.
-    calibrations : dict of Calibration
-    rate : float
-        Hz.
-    duration : float or None
-        s; None: until it is stopped.
-    """
+    """Which inputs are measured, how fast and how long."""
 
     inputs: tuple[Input, ...]
     loopbacks: frozenset[str]
+    """Names of inputs to which an output is wired."""
     calibrations: dict[str, Calibration]
     rate: float
+    """Hz."""
     duration: float | None
+    """s; None: until it is stopped."""
 
     @property
     def count(self) -> int | None:
@@ -66,13 +57,7 @@ def wanted_of(
     rate: float,
     duration: float | None,
 ) -> Wanted:
-    """Return what is asked for.
-
-    Raises
-    ------
-    UsageError
-        Something of it cannot be meant; nothing was opened yet.
-    """
+    """Return the measurement that is asked for; raise UsageError, with nothing opened yet, if it cannot be meant."""
     inputs = inputs_of([*channels, *loopbacks])
     if not inputs:
         raise UsageError(
@@ -105,24 +90,10 @@ def measured(
 ) -> Recording:
     """Measure, and return the recording; its attribute `ended` says why it is shorter than asked for.
 
-    Parameters
-    ----------
-    rig : str, Rig or None
-        As `--rig` has it, or one that is open; None: the board of this machine.
-    wanted : Wanted
-    describe : callable
-        Returns the measurement, once the device has said what it makes of the inputs and the rate.
-    most_pulses : int or None
-        Pulses after which it ends, of a measurement of pulses.
-    journal : path or None
-        Where all is kept meanwhile; None: in memory. It stays there: who has the recording removes it.
-    live : bool
-        Show how it goes.
-
-    Raises
-    ------
-    UsageError, RigError
-        The rig refuses what is asked for, or fails before there are samples.
+    The rig is as `--rig` has it, one that is open, or (None) the board of this machine. `describe` returns the
+    measurement, once the device has said what it makes of the inputs and the rate. It ends after `most_pulses`, where
+    only pulses are measured. All is kept in `journal` meanwhile (None: in memory), which stays there: who has the
+    recording removes it. UsageError, RigError: the rig refuses what is asked for, or fails before there are samples.
     """
     with ExitStack() as stack:
         opened = rig if isinstance(rig, Rig) else stack.enter_context(opened_rig(rig))
@@ -178,14 +149,9 @@ def measure_into(
     """Measure into a file, with a journal beside it meanwhile, which is removed when the file is safely there.
 
     Where only pieces are kept (`in_pieces`) nobody knows how many: the disk must have room for those of a minute.
-
-    Raises
-    ------
-    UsageError
-        Before anything is measured: the file, its disk, or what is asked for is not to be had. After: the file
-        could not be written; the journal is still there.
-    RigError
-        The measurement ended early; what was measured until then is in the file.
+    UsageError before anything is measured: the file, its disk, or the measurement is not to be had. UsageError after
+    it: the file could not be written, and the journal is still there. RigError: the measurement ended early, and what
+    was measured is in the file.
     """
     output = options.output
     refuse_outputs((), output, None)

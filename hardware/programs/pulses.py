@@ -31,21 +31,8 @@ class PulseFinder:
     A pulse begins where the channel passes the threshold and is over where it has come back below a part of it
     (`hysteresis`), so that noise does not split it. What passes the threshold within the dead time from its start, such
     as the ringing of a load cell, belongs to it. Kept are all samples of pulses, those within `before` and `after`
-    them, and those of the dead time, each once.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        With its `pulses`.
-    most : int or None
-        Pulses after which it is done.
-
-    Attributes
-    ----------
-    starts : list of int
-        Number of the first sample of each pulse beyond the threshold.
-    done : bool
-        There are as many pulses as wanted, and all of the last one is kept.
+    them, and those of the dead time, each once. After `most` pulses it is `done`, once all of the last one is kept.
+    `starts` has the number of the first sample of each pulse beyond the threshold.
     """
 
     def __init__(self, measurement: Measurement, most: int | None = None) -> None:
@@ -165,17 +152,7 @@ def with_pulses(
     """Return the recording with an event train of its pulses: their instants, peaks and impulses.
 
     A peak is the largest sample above the level before the pulse, an impulse the integral down to 5 % of it: a first
-    look. `vibroimpact spikes` measures both with their errors.
-
-    Parameters
-    ----------
-    recording : Recording
-    measurement : Measurement
-    blocks : sequence of Block
-        What was kept.
-    gaps : sequence of Gap
-    watched : int
-        Samples that were looked at.
+    look. `vibroimpact spikes` measures both with their errors. `watched` samples were looked at.
     """
     rule = measurement.pulses
     assert rule is not None

@@ -123,12 +123,7 @@ def drive_output(options: DriveSine) -> None:
 
 
 def sine_of(frequency: float, amplitude: float, ramp: float, duration: float | None, rate: float) -> Sine:
-    """Return the sine that is asked for; `duration` (s) is rounded to samples.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Return the sine that is asked for; `duration` (s) is rounded to samples. A wrong one raises UsageError."""
     if duration is not None and not (duration > 0.0 and np.isfinite(duration * rate)):
         raise UsageError(f"--duration: expected a number > 0, s, got {duration!r}.")
     return Sine(frequency, amplitude, rate, ramp, None if duration is None else round(duration * rate))

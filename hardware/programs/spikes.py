@@ -107,12 +107,7 @@ def _describer(wanted: Wanted, options: RecordSpikes) -> Describe:
 
 
 def _refuse_wrong(options: RecordSpikes, names: Sequence[str]) -> None:
-    """Refuse what cannot be meant of pulses on channels of these names, all of it at once.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Raise UsageError, of all problems at once, if options of pulses are wrong for channels of these names."""
     dead = options.dead_time * options.rate
     rules = (
         ("--threshold", "a finite number, not 0", options.threshold, 0.0 < abs(options.threshold) < np.inf),

@@ -57,35 +57,23 @@ class StepSamples:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredStep:
-    """What a step has shown.
-
-    Attributes
-    ----------
-    place : int
-        Along the path.
-    highest, lowest : ndarray of float, shape (value,)
-        m; each the mean of `average_periods` periods.
-    strobe : ndarray of float, shape (value, 2)
-        Displacement (m) and velocity (m/s) where the forcing phase is 0, at the first period of each.
-    impacts : ndarray of float, shape (value,), or None
-        Mean number of impacts in a period; None without a load cell.
-    flags : MeasurementFlag
-    message : str
-        What is wrong; empty where nothing is.
-    drive : Drive
-    final_displacement : float
-        m.
-    """
+    """What a step has shown."""
 
     place: int
+    """Along the path."""
     highest: Floats
     lowest: Floats
+    """`highest` and `lowest`: m, shape (value,), each the mean of `average_periods` periods."""
     strobe: Floats
+    """Displacement (m) and velocity (m/s) at forcing phase 0 of the first period of each, shape (value, 2)."""
     impacts: Floats | None
+    """Mean number of impacts in a period, shape (value,); None without a load cell."""
     flags: MeasurementFlag
     message: str
+    """What is wrong; empty where nothing is."""
     drive: Drive
     final_displacement: float
+    """m."""
 
     @property
     def range(self) -> float:
@@ -95,14 +83,7 @@ class MeasuredStep:
 
 
 class StepCollector:
-    """Cuts the stream of an acquisition into steps, by the numbers of its samples.
-
-    Parameters
-    ----------
-    plan : Plan
-    inputs : int
-        How many there are.
-    """
+    """Cuts the stream of an acquisition of so many inputs into steps, by the numbers of its samples."""
 
     def __init__(self, plan: Plan, inputs: int) -> None:
         self._left = [segment for segment in plan.segments if segment.kind in ("step", "repeat")]
@@ -140,17 +121,7 @@ def analysed(
     scale: Scale,
     converters: Sequence[Converter],
 ) -> MeasuredStep:
-    """Return what the samples of a step show.
-
-    Parameters
-    ----------
-    step : StepSamples
-    settings : SweepSettings
-    scale : Scale
-        Of the input that measures the displacement.
-    converters : sequence of Converter
-        Of each input.
-    """
+    """Return what a step shows, by the scale of the displacement's input and the converter of each input."""
     segment, rate = step.segment, settings.output.rate
     edges = recorded_periods(settings, segment) - segment.first
     place = settings.place_of("displacement")

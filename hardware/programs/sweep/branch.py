@@ -17,12 +17,9 @@ _SAME = 0.05
 def refuse_other_branch(
     before: MeasuredStep, now: MeasuredStep, settings: SweepSettings, folder: Path
 ) -> None:
-    """Refuse to go on where the last finished step, measured again, shows another motion.
+    """Raise RigError if the last finished step, measured again, shows another motion.
 
-    Raises
-    ------
-    RigError
-        The ranges differ by more than 5 % and by more than they vary from period to period.
+    Its ranges differ then by more than 5 % and by more than they vary from period to period.
     """
     spread = max(_spread(before), _spread(now))
     difference = abs(before.range - now.range)

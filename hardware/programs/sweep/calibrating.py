@@ -21,10 +21,7 @@ Floats = NDArray[np.float64]
 def calibrations_of(settings: SweepSettings) -> dict[str, Calibration]:
     """Return the calibrations of a sweep by the names of its inputs.
 
-    Raises
-    ------
-    UsageError
-        One is wrong or of another input, or there is none of the displacement in a unit of length.
+    UsageError: one is wrong or of another input, or there is none of the displacement in a unit of length.
     """
     if isinstance(settings.calibration, str):
         file = Path(settings.source).parent / settings.calibration

@@ -39,26 +39,17 @@ _STROBED = ("displacement", "velocity")
 
 @dataclass(slots=True)
 class SweepRows:
-    """What is measured of a sweep so far.
-
-    Attributes
-    ----------
-    settings : SweepSettings
-    calibration : str
-        TOML.
-    steps : list of MeasuredStep
-        The first ones of the path, in its order.
-    made_by : dict
-        `rig`, `device` and `measured_at`, a line for each time that it was begun or went on.
-    begun_with : list of int
-        Steps that were there then.
-    """
+    """What is measured of a sweep so far."""
 
     settings: SweepSettings
     calibration: str
+    """TOML."""
     steps: list[MeasuredStep] = field(default_factory=list)
+    """The first ones of the path, in its order."""
     made_by: dict[str, str] = field(default_factory=dict)
+    """`rig`, `device` and `measured_at`, a line for each time that it was begun or went on."""
     begun_with: list[int] = field(default_factory=list)
+    """Steps that were there then."""
 
     @property
     def complete(self) -> bool:
@@ -158,10 +149,7 @@ def store(rows: SweepRows, folder: Path) -> None:
 def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows:
     """Return what a folder has of a sweep; nothing where it is new.
 
-    Raises
-    ------
-    UsageError
-        The folder is that of another sweep, of a campaign, or its dataset is damaged.
+    A folder of another sweep, of a campaign, or with a damaged dataset raises UsageError.
     """
     path = folder / DATASET
     rows = SweepRows(settings, calibration)

@@ -19,24 +19,16 @@ _FEWEST_PERIODS = 2
 
 
 class Drive(NamedTuple):
-    """The drive of a step as an input saw it.
-
-    Attributes
-    ----------
-    amplitude : float
-        V.
-    lag : float
-        Seen less planned in the middle of the step, s, within half a period.
-    clock_error : float
-        Of the inputs' clock, 1e-6, from this step alone: it is fast where this is positive.
-    residual : float
-        RMS of what is no sine of the planned frequency, over the amplitude.
-    """
+    """The drive of a step as an input saw it."""
 
     amplitude: float = np.nan
+    """V."""
     lag: float = np.nan
+    """Seen less planned in the middle of the step, s, within half a period."""
     clock_error: float = np.nan
+    """Of the inputs' clock, 1e-6, from this step alone: it is fast where this is positive."""
     residual: float = np.nan
+    """RMS of what is no sine of the planned frequency, over the amplitude."""
 
     def late(self, after: float) -> float:
         """Return the lag (s) at a time (s) after the middle of the step; 0 where nobody has seen it."""
@@ -48,15 +40,8 @@ def seen_drive(volts: Floats, segment: Segment, rate: float) -> Drive:
     """Return what an input saw of the drive of a step.
 
     The step is cut into parts; each is fitted by the planned sine with an amplitude, a phase and an offset of its own.
-    Where the clock of the inputs is fast by e the phase falls behind by 2 pi f e in a second.
-
-    Parameters
-    ----------
-    volts : ndarray of float, shape (sample,)
-        All samples of the step, NaN where missing.
-    segment : Segment
-    rate : float
-        Samples per second.
+    Where the clock of the inputs is fast by e the phase falls behind by 2 pi f e in a second. `volts` are all samples
+    of the step, shape (sample,), NaN where missing.
     """
     periods = segment.count * segment.increment / CYCLE
     parts = int(min(_PARTS, periods // _FEWEST_PERIODS))
@@ -93,34 +78,24 @@ def _fitted(volts: Floats, angle: Floats) -> tuple[complex, float] | None:
 
 
 class SeenLags(NamedTuple):
-    """The lags of the steps that one acquisition has seen, in their order.
-
-    Attributes
-    ----------
-    time : ndarray of float, shape (step,)
-        Middle of each step, s.
-    lag, clock_error : ndarray of float, shape (step,)
-        Of `Drive`.
-    period : ndarray of float, shape (step,)
-        Forcing period, s.
-    """
+    """The lags of the steps that one acquisition has seen, in their order; each field has shape (step,)."""
 
     time: Floats
+    """Middle of each step, s."""
     lag: Floats
+    """s, as in `Drive`."""
     clock_error: Floats
+    """1e-6, as in `Drive`."""
     period: Floats
+    """Forcing period, s."""
 
 
 def clock_error_of(seen: Sequence[SeenLags]) -> tuple[float, float]:
     """Return the error of the inputs' clock and its standard error, 1e-6: the slope of the lag over all steps.
 
     An input sees the steps of a converter, so that the lag grows by whole samples: what one step shows of its slope is
-    coarse, and serves to tell how many periods the lag has grown by from step to step.
-
-    Parameters
-    ----------
-    seen : sequence of SeenLags
-        Of each acquisition, whose clocks have begun anew.
+    coarse, and serves to tell how many periods the lag has grown by from step to step. Each acquisition begins its
+    clocks anew.
     """
     time, lag = [], []
     for each in seen:

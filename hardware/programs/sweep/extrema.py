@@ -15,24 +15,12 @@ _KINK = 10.0
 
 
 def extrema_of(values: Floats, edges: Indices) -> tuple[Floats, Floats]:
-    """Return the largest and the smallest value of each period; NaN where a sample of it is missing.
+    """Return the largest and the smallest value of each period, shape (period,); NaN where a sample of it is missing.
 
     A smooth extremum is that of the parabola through its three samples, that of an impact where the lines before and
-    after it meet: the error falls with the square of the sample interval in both cases.
+    after it meet: the error falls with the square of the sample interval in both cases. Periods begin at `edges`, whose
+    last one is the end of the last period.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-        NaN where a sample is missing.
-    edges : ndarray of int, shape (period + 1,)
-        Where the periods begin, and where the last one ends.
-
-    Returns
-    -------
-    tuple of ndarray, shape (period,)
-
-    Examples
-    --------
     >>> wave = np.sin(2.0 * np.pi * (np.arange(100) + 0.3) / 50)
     >>> highest, lowest = extrema_of(wave, np.array([0, 50, 100]))
     >>> bool(np.abs(highest - 1.0).max() < 2e-5 > np.abs(lowest + 1.0).max())

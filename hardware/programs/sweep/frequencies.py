@@ -30,19 +30,8 @@ class RangeTable(BaseModel):
 
 
 def frequencies_of(raw: Any, problems: list[Problem], most: int) -> tuple[float, ...] | None:
-    """Return the ascending frequencies (Hz) that a sweep asks for; None, and its problems added, where it is wrong.
+    """Return the ascending frequencies (Hz) of an array or table, at most `most`; None, and problems added, if wrong.
 
-    Parameters
-    ----------
-    raw : object
-        What the document has: an array, or a table.
-    problems : list of Problem
-        Grows.
-    most : int
-        How many there may be.
-
-    Examples
-    --------
     >>> frequencies_of({"start": 18.0, "stop": 18.3, "step": 0.1}, [], 10)
     (18.0, 18.1, 18.2, 18.3)
     """

@@ -19,12 +19,7 @@ _COMMANDS = "vibroimpact.orchestrator.commands.cli"
 
 
 class LiveFigure:
-    """The figure in the folder of a sweep.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """The figure in the folder of a sweep."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

@@ -26,26 +26,18 @@ Kind = Literal["rise", "pass", "repeat", "step", "fall"]
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A stretch of the output at one frequency.
-
-    Attributes
-    ----------
-    kind : str
-        "rise" and "fall" of the amplitude, "step", "pass" through a finished step, "repeat" of the last finished one.
-    place : int
-        Number of the step along the path, from 0; -1 of rise and fall.
-    first, count : int
-        Its samples.
-    increment, phase : int
-        Phase that a sample adds, and phase at the first sample, in units of 1 / `CYCLE`.
-    """
+    """A stretch of the output at one frequency."""
 
     kind: Kind
+    """Rise and fall of the amplitude, a step, a pass through a finished step, or a repeat of the last finished one."""
     place: int
+    """Number of the step along the path, from 0; -1 of rise and fall."""
     first: int
+    """Number of its first sample."""
     count: int
     increment: int
     phase: int
+    """`increment` a sample, and `phase` at the first sample, are in units of 1 / `CYCLE`."""
 
     @property
     def stop(self) -> int:
@@ -64,21 +56,14 @@ def _samples_to(cycles: int, phase: int, increment: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The whole output of a sweep; a waveform that `Output` takes.
-
-    Attributes
-    ----------
-    rate : float
-        Samples per second.
-    amplitude : float
-        V.
-    segments : tuple of Segment
-        Each begins at the sample where the one before has ended.
-    """
+    """The whole output of a sweep; a waveform that `Output` takes."""
 
     rate: float
+    """Samples per second."""
     amplitude: float
+    """V."""
     segments: tuple[Segment, ...]
+    """Each begins at the sample where the one before has ended."""
     _firsts: tuple[int, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -96,16 +81,7 @@ class Plan:
         return self.samples / self.rate
 
     def volts(self, first: int, count: int) -> Floats:
-        """Return samples of the output, V; 0 before it begins and after it has ended.
-
-        Parameters
-        ----------
-        first, count : int
-
-        Returns
-        -------
-        ndarray of float, shape (count,)
-        """
+        """Return samples of the output, V, shape (count,); 0 before it begins and after it has ended."""
         found = np.zeros(count)
         place = max(0, bisect_right(self._firsts, first) - 1)
         for segment in self.segments[place:]:
@@ -134,12 +110,6 @@ def planned(settings: SweepSettings, finished: int = 0) -> Plan:
 
     The amplitude rises at the first frequency of the path. Finished steps are passed through in the order of the path,
     so that the motion is on the branch that it was on; the last of them is repeated in full, so that this can be seen.
-
-    Parameters
-    ----------
-    settings : SweepSettings
-    finished : int
-        Less than there are steps.
     """
     steps, sweep = settings.steps, settings.sweep
     asked: list[tuple[Kind, int, float, int]] = [("rise", -1, steps[0][1], settings.output.ramp_periods)]
@@ -159,12 +129,9 @@ def planned(settings: SweepSettings, finished: int = 0) -> Plan:
 
 
 def recorded_periods(settings: SweepSettings, segment: Segment) -> NDArray[np.int64]:
-    """Return where the recorded periods of a step begin, and where the last one ends, as sample numbers.
+    """Return the sample numbers where recorded periods of a step begin and the last one ends, shape (periods + 1,).
 
-    Returns
-    -------
-    ndarray of int, shape (periods + 1,)
-        A period has as many samples as lie in it: its number differs by one from period to period.
+    A period has as many samples as lie in it: its number differs by one from period to period.
     """
     whole = range(settings.sweep.transient_periods, settings.step_periods + 1)
     return np.array([segment.begin_of(period) for period in whole], dtype=np.int64)

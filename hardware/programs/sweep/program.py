@@ -45,44 +45,27 @@ _RATE_ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class SweepReport:
-    """What a command did.
-
-    Attributes
-    ----------
-    dataset : Path
-    steps, before, planned : int
-        Steps in the dataset; those that were there before; those of the whole sweep.
-    stopped : bool
-        Whether it was stopped before its end.
-    """
+    """What a command did."""
 
     dataset: Path
     steps: int
+    """Steps in the dataset."""
     before: int
+    """Those that were there before."""
     planned: int
+    """Those of the whole sweep."""
     stopped: bool
+    """Whether it was stopped before its end."""
 
 
 def measure(
     settings: SweepSettings, folder: Path, rig: str | None = None, progress: Progress | None = None
 ) -> SweepReport:
-    """Measure a sweep into a folder, or go on with it.
+    """Measure a sweep into a folder, made when absent, or go on with it.
 
-    Parameters
-    ----------
-    settings : SweepSettings
-    folder : Path
-        Made when absent.
-    rig : str, optional
-        As `--rig` takes it; else as the file of the sweep says, else the board of this machine.
-    progress : Progress, optional
-
-    Raises
-    ------
-    UsageError
-        The folder is of something else, there is no such rig, or it lacks what is asked for: nothing was driven.
-    RigError
-        The rig failed, or the motion is on another branch than before. What was measured is in the folder.
+    The rig is that of `--rig`, else of the file of the sweep, else the board of this machine. UsageError: the folder is
+    of something else, there is no such rig, or it lacks what is asked for; nothing was driven. RigError: the rig
+    failed, or the motion is on another branch than before; what was measured is in the folder.
     """
     limits = Limits(settings.output.highest, settings.output.slew)
     calibrations = calibrations_of(settings)

@@ -94,31 +94,20 @@ class InputTable(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class SweepSettings:
-    """A sweep as its file says it, checked.
-
-    Attributes
-    ----------
-    source, text : str
-        The file, and what is in it.
-    rig : str or None
-        Where `--rig` says nothing.
-    output : OutputTable
-    sweep : SweepTable
-    frequencies : tuple of float
-        Hz, ascending.
-    inputs : tuple of InputTable
-    calibration : str or dict
-        The file of the calibration, or its tables.
-    """
+    """A sweep as its file says it, checked."""
 
     source: str
     text: str
+    """The file is `source`, its content `text`."""
     rig: str | None
+    """Where `--rig` says nothing."""
     output: OutputTable
     sweep: SweepTable
     frequencies: tuple[float, ...]
+    """Hz, ascending."""
     inputs: tuple[InputTable, ...]
     calibration: str | dict[str, Any]
+    """The file of the calibration, or its tables."""
 
     @property
     def steps(self) -> tuple[tuple[Direction, float], ...]:
@@ -160,10 +149,7 @@ class SweepSettings:
 def read_sweep(path: Path) -> SweepSettings:
     """Read the file of a sweep.
 
-    Raises
-    ------
-    UsageError
-        It cannot be read, is no TOML, or describes no sweep: all problems, a line for each.
+    UsageError has all problems, a line for each: it cannot be read, is no TOML, or describes no sweep.
     """
     try:
         with path.open("rb") as file:
@@ -177,10 +163,7 @@ def read_sweep(path: Path) -> SweepSettings:
 def parse_sweep(text: str, source: str) -> SweepSettings:
     """Return the sweep that a TOML text describes; `source` is what messages call it.
 
-    Raises
-    ------
-    UsageError
-        All problems, a line for each.
+    UsageError has all problems, a line for each.
     """
     try:
         document = parse_toml(text)
