@@ -15,28 +15,12 @@ FADE = 0.2
 
 
 class Course:
-    """What an output puts out from its first sample until it is at rest.
+    """What an output puts out from its first sample until it is at rest, at a rate in Hz.
 
     A waveform that is stopped fades. One that ends elsewhere than at 0 V, or that gives what the limits refuse, is left
-    where it was: from there the voltage falls to 0. After that all samples are 0.
-
-    Parameters
-    ----------
-    waveform : Waveform
-    limits : Limits
-    rate : float
-        Hz.
-
-    Attributes
-    ----------
-    next : int
-        Number of the sample that is next.
-    last : float
-        Sample before it, V.
-    rest : int or None
-        Number from which on all samples are 0; None: it is not known yet.
-    failure : Exception or None
-        Why the waveform was left.
+    where it was: from there the voltage falls to 0. After that all samples are 0. `next` is the number of the next
+    sample, `last` the sample before it, V. All samples are 0 from the number `rest` on (None: not known yet); `failure`
+    is why the waveform was left.
     """
 
     def __init__(self, waveform: Waveform, limits: Limits, rate: float) -> None:

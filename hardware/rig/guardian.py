@@ -120,13 +120,7 @@ class Rescue:
         return bool(self._memory.driving)
 
     def come_to_rest(self) -> None:
-        """Bring the output to 0 V, where it was driven.
-
-        Raises
-        ------
-        DaqError, RpcError, RigError
-            It could not.
-        """
+        """Bring the output to 0 V, where it was driven; DaqError, RpcError, RigError where that fails."""
         if self._order.attach:
             self._by_attaching()
         elif self._memory.driving:

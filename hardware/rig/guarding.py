@@ -20,49 +20,28 @@ READY, REST, TAKE_OVER = "ready", "rest", "take over"
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a guardian guards.
-
-    Attributes
-    ----------
-    terminal : str
-    rate, amplitude, slew : float
-        Of the output and its limits: Hz, V, V/s.
-    session : str
-        Name of the task.
-    address : str
-        `host:port` of the server; empty: the driver of this machine.
-    attach : bool
-        Whether the task of another process can be attached to.
-    program : int
-        Process that drives.
-    descriptor, capacity : int
-        Of the memory that is shared.
-    """
+    """What a guardian guards."""
 
     terminal: str
     rate: float
     amplitude: float
     slew: float
+    """Rate, amplitude and slew of the output and its limits: Hz, V, V/s."""
     session: str
+    """Name of the task."""
     address: str
+    """`host:port` of the server; empty: the driver of this machine."""
     attach: bool
+    """Whether the task of another process can be attached to."""
     program: int
+    """Process that drives."""
     descriptor: int
     capacity: int
+    """Descriptor and capacity of the memory that is shared."""
 
 
 class Guardian:
-    """A guardian that was started; it is there when `await_ready` has returned.
-
-    Parameters
-    ----------
-    order : Order
-
-    Raises
-    ------
-    RigError
-        It cannot be started.
-    """
+    """A guardian that was started, else RigError; it is there when `await_ready` has returned."""
 
     def __init__(self, order: Order) -> None:
         try:
@@ -72,13 +51,7 @@ class Guardian:
         self._tell(json.dumps(asdict(order)))
 
     def await_ready(self) -> None:
-        """Wait until it guards.
-
-        Raises
-        ------
-        RigError
-            It does not.
-        """
+        """Wait until it guards; raise RigError if it does not."""
         said = self._process.line(READY_SECONDS)
         if said != READY:
             raise RigError(

@@ -15,17 +15,10 @@ _REAL_TIME = 0.2
 
 
 class Lateness:
-    """How much later than the promptest of all blocks the others came.
+    """How much later than the promptest of all blocks the others came, at a rate in samples per second.
 
     It counts in the time of the computer; of a virtual rig that is faster than life it is of no interest.
 
-    Parameters
-    ----------
-    rate : float
-        Samples per second.
-
-    Examples
-    --------
     >>> late = Lateness(100.0)
     >>> late.begin(5.0)
     >>> for end, now in ((100, 6.01), (200, 7.02), (300, 8.01)):

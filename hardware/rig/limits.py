@@ -57,21 +57,9 @@ class Limits:
             )
 
     def check(self, volts: Floats, last: float, rate: float, first: int = 0) -> None:
-        """Refuse samples that are no numbers or beyond the limits.
+        """Raise UsageError if samples, shape (sample,), are no numbers or beyond the limits.
 
-        Parameters
-        ----------
-        volts : ndarray of float, shape (sample,)
-        last : float
-            Sample before them, V.
-        rate : float
-            Samples per second.
-        first : int
-            Number of the first sample, for the message.
-
-        Raises
-        ------
-        UsageError
+        The sample before them is `last`, V; the message counts from `first`, the number of the first sample.
         """
         wrong = ~(np.abs(volts) <= self.amplitude * (1.0 + _ROUNDING))
         if wrong.any():
@@ -99,16 +87,8 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Fall:
-    """A half cosine from a voltage, which is not in it, to 0, its last sample.
+    """A half cosine from a voltage (V), which is not in it, to 0, its last sample.
 
-    Attributes
-    ----------
-    start : float
-        V.
-    samples : int
-
-    Examples
-    --------
     >>> Fall(2.0, 4).volts(0, 4).round(3).tolist()
     [1.707, 1.0, 0.293, 0.0]
     """

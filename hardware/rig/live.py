@@ -22,12 +22,7 @@ LINE_SECONDS = 10.0
 
 
 class Levels:
-    """Levels of inputs since they were last told, and samples at the ends of ranges since the beginning.
-
-    Parameters
-    ----------
-    inputs : sequence of MeasuredInput
-    """
+    """Levels of inputs since they were last told, and samples at the ends of ranges since the beginning."""
 
     def __init__(self, inputs: Sequence[MeasuredInput]) -> None:
         self._inputs = tuple(inputs)

@@ -19,39 +19,23 @@ _FIELDS = ("beat", "driving", "announced", "written", "generated", "generated_at
 
 
 class SharedSamples:
-    """The last samples of an output, by number.
+    """The last samples of an output, by number, at most `capacity`; OSError where there is no room.
 
-    Parameters
-    ----------
-    capacity : int
-        Samples that are kept.
-    descriptor : int or None
-        Of the memory of another process; None: new memory, which is gone when no process holds it.
-
-    Attributes
-    ----------
-    descriptor : int
-    beat : int
-        Grows as long as the writer lives.
-    driving : int
-        1 from just before the output starts until it is at rest.
-    announced, written, generated : int
-        Samples that may have been sent; that were accepted; that were out at `generated_at`.
-    generated_at : int
-        `time.monotonic_ns`.
-
-    Raises
-    ------
-    OSError
-        There is no room.
+    The descriptor is that of the memory of another process; None: new memory, which is gone when no process holds it.
     """
 
     beat: int
+    """Grows as long as the writer lives."""
     driving: int
+    """1 from just before the output starts until it is at rest."""
     announced: int
+    """Samples that may have been sent."""
     written: int
+    """Samples that were accepted."""
     generated: int
+    """Samples that were out at `generated_at`."""
     generated_at: int
+    """`time.monotonic_ns`."""
 
     def __init__(self, capacity: int, descriptor: int | None = None) -> None:
         size = 8 * (len(_FIELDS) + capacity)

@@ -23,15 +23,8 @@ _STILL = 2.0
 def noise_of(volts: NDArray[np.float64], step: float) -> float | None:
     """Return the noise of a channel that shows nothing else, V; None where there is a signal, or too few samples.
 
-    Parameters
-    ----------
-    volts : ndarray of float, shape (sample,)
-        NaN where samples are missing.
-    step : float
-        Of the converter, V.
+    Missing samples are NaN; `step` is that of the converter, V.
 
-    Examples
-    --------
     >>> time = np.arange(2000.0)
     >>> noise_of(np.sin(0.1 * time), 1e-4) is None
     True
@@ -54,14 +47,7 @@ def noise_of(volts: NDArray[np.float64], step: float) -> float | None:
 def quiet_remark(name: str, volts: NDArray[np.float64], step: float, is_loopback: bool) -> str:
     """Return what is said of a channel that shows nothing above its noise; empty where it shows something.
 
-    Parameters
-    ----------
-    name : str
-    volts : ndarray of float, shape (sample,)
-    step : float
-        Of the converter, V.
-    is_loopback : bool
-        An output is wired to it.
+    `step` is that of the converter, V; an output is wired to a loopback.
     """
     noise = noise_of(volts, step)
     if noise is None:

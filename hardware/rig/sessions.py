@@ -19,13 +19,7 @@ _LOOKS = 20
 
 
 def input_task(rig: Rig, device: str) -> Any:
-    """Return a new task for inputs of a device.
-
-    Raises
-    ------
-    RigError
-        Another program is reading them.
-    """
+    """Return a new task for inputs of a device; raise RigError if another program is reading them."""
     if rig.channel is None:  # the driver frees what a dead program had
         return daqmx.nidaqmx.Task()
     name = f"vibroimpact-inputs-{device}"

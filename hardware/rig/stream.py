@@ -44,26 +44,10 @@ def add_output(task: Any, terminal: str, rate: float, limits: Limits) -> None:
 
 
 class OutputStream:
-    """The samples that go into an output task, by number.
+    """The samples that go into an output task, by number, at a rate in Hz.
 
-    Parameters
-    ----------
-    task : nidaqmx.Task
-    rate : float
-        Hz.
-    limits : Limits
-    memory : SharedSamples
-        Is told of each sample before it is sent.
-    written : int
-        Samples that are in the task already.
-    last : float
-        The last of them, or what the output holds, V.
-
-    Attributes
-    ----------
-    written : int
-    generated : int
-        Samples that are out, as the device says.
+    The memory is told of each sample before it is sent. `written` samples are in the task already, the last of which,
+    or what the output holds, is `last`, V; `generated` are out, as the device says.
     """
 
     def __init__(
@@ -85,14 +69,8 @@ class OutputStream:
     def send(self, volts: Floats) -> None:
         """Send samples, shape (sample,); return when the buffer has them.
 
-        Raises
-        ------
-        UsageError
-            They are beyond the limits: none was sent.
-        DaqError, RpcError
-            The rig refuses them. `written` counts those that it took.
-        RigError
-            No sample moved for 15 s.
+        Samples beyond the limits raise UsageError, and none is sent. DaqError, RpcError: the rig refuses them, and
+        `written` counts those that it took. RigError: no sample moved for 15 s.
         """
         self._limits.check(volts, self._last, self.rate, self.written)
         self._memory.announce(self.written, volts)
@@ -148,10 +126,7 @@ class OutputStream:
     def finish(self, fall: Fall, *, start: bool = False) -> None:
         """Send a fall, then zeros until its end is out, and stop; `start`: the task does not run yet.
 
-        Raises
-        ------
-        DaqError, RpcError, RigError
-            As `send`.
+        Errors are those of `send`.
         """
         begin = self.written
         if start:
@@ -166,10 +141,7 @@ class OutputStream:
 def bring_to_rest(task: Any, rate: float, limits: Limits, memory: SharedSamples, held: float) -> None:
     """Bring the output of a task that does not run from the voltage that it holds to 0.
 
-    Raises
-    ------
-    DaqError, RpcError, RigError
-        The rig refuses it, or this machine is too slow for it again and again.
+    DaqError, RpcError, RigError: the rig refuses it, or this machine is too slow for it again and again.
     """
     for left in reversed(range(_TRIES)):
         stream = OutputStream(task, rate, limits, memory, 0, held)

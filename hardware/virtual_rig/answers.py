@@ -19,13 +19,7 @@ _FOR_EVER = -1.0
 
 
 class Answers:
-    """A board and its tasks.
-
-    Attributes
-    ----------
-    caller : threading.local
-        Its `active` says whether the program whose call a thread answers still waits.
-    """
+    """A board and its tasks; `caller.active` says whether the program whose call a thread answers still waits."""
 
     def __init__(self, board: Board) -> None:
         self._board = board

@@ -35,18 +35,7 @@ PERIOD = 0.004
 class Board:
     """A device with its tasks; all that touches it is done under its lock.
 
-    Parameters
-    ----------
-    settings : RigSettings
-
-    Attributes
-    ----------
-    pace : Pace
-        Where its time should be.
-    analog : Sampling
-        Its outputs and inputs.
-    served_at : float
-        When its time was 0, s since 1970.
+    `pace` is where its time should be, `analog` its outputs and inputs; its time was 0 at `served_at`, s since 1970.
     """
 
     def __init__(self, settings: RigSettings) -> None:
@@ -129,13 +118,8 @@ class Board:
     def wait_for(self, holds: Callable[[], bool], wanted: Callable[[], int], timeout: float) -> bool:
         """Wait until something holds, at most so long (s; < 0: for ever); return whether it does.
 
-        Parameters
-        ----------
-        holds : callable
-        wanted : callable
-            The tick at which it is expected to hold: where time goes to in lockstep.
-        timeout : float
-            Of the program; a rig slower than life gives it more.
+        In lockstep time goes to the `wanted` tick, where it is expected to hold. A rig slower than life gives the
+        program's timeout more.
         """
         wall = timeout / min(self.pace.speed, 1.0) if not self.pace.lockstep else timeout
         end = np.inf if timeout < 0 else time.monotonic() + wall
@@ -309,12 +293,10 @@ class Board:
             return started
 
     def stop(self, task: Task) -> int:
-        """Stop a task; an output holds its last value. Return the status: a warning where a finite task is not done.
+        """Stop a task; an output holds its last value.
 
-        Raises
-        ------
-        Refusal
-            It had failed before: said once more.
+        The status returned is a warning where a finite task is not done. A task that had failed before raises its
+        Refusal once more.
         """
         with self.changed:
             self.catch_up()

@@ -43,12 +43,7 @@ Call = Callable[[Any, Any], bytes | None]
 
 
 class Calls(Reads, Writes, Listening):
-    """Answers the calls of NI's service on a board; each takes the request and fills in the response.
-
-    Parameters
-    ----------
-    board : Board
-    """
+    """Answers the calls of NI's service on a board; each takes the request and fills in the response."""
 
     def __init__(self, board: Board) -> None:
         super().__init__(board)

@@ -15,25 +15,8 @@ from vibroimpact.hardware.virtual_rig.tasks import Channel
 class Inputs:
     """Converts voltages with the noise on their wires, and has the faults that a test gives it.
 
-    Parameters
-    ----------
-    bits : int
-        Of the converter.
-    noise : dict of int to float
-        Its rms at an input, V; an input that is not there has none.
-    seed : int
-        Of the noise, which depends on it, on the number of the input and on how many samples that has taken before.
-    clock_error : float
-        At first, ppm.
-
-    Attributes
-    ----------
-    stuck : dict of int to float or None
-        V that an input keeps, by its number; None: what it converts next.
-    clipped : dict of int to float
-        V, to both sides of 0, at which an input ends.
-    clock_error : float
-        Of the input clock against true time, which the output clock keeps, ppm.
+    `noise` is the rms at an input, V, by its number; an input that is not there has none. It depends on the seed, on
+    the number of the input and on how many samples that has taken before.
     """
 
     def __init__(
@@ -43,8 +26,11 @@ class Inputs:
         self._taken: dict[int, int] = {}
         self._usual_error = clock_error
         self.stuck: dict[int, float | None] = {}
+        """V that an input keeps, by its number; None: what it converts next."""
         self.clipped: dict[int, float] = {}
+        """V, to both sides of 0, at which an input ends."""
         self.clock_error = clock_error
+        """Of the input clock against true time, which the output clock keeps, ppm."""
 
     def mend(self) -> None:
         """Take all faults away."""

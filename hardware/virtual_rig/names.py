@@ -15,15 +15,10 @@ _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d{1,6}):(?:(?P<again>.*\D)?(?P<las
 
 
 def expanded(text: str) -> list[str]:
-    """Return the names in a list such as `tip, Dev1/ai2:4`.
+    """Return the names in a list such as `tip, Dev1/ai2:4`; raise Refusal for no list, or above `MOST_NAMES` names.
 
     >>> expanded("tip, Dev1/ai2:4")
     ['tip', 'Dev1/ai2', 'Dev1/ai3', 'Dev1/ai4']
-
-    Raises
-    ------
-    Refusal
-        It is no such list, or one of more than `MOST_NAMES` names.
     """
     names: list[str] = []
     for part in (each.strip() for each in text.split(",")):

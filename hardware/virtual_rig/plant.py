@@ -14,21 +14,14 @@ TICK = 1e-9
 
 
 class Plant(Protocol):
-    """What goes on for as long as a rig is served.
-
-    Attributes
-    ----------
-    now : int
-        The time reached, in ticks.
-    seed : int
-        Of the noise on its signals.
-    fineness : float
-        Steps that it makes in a second by itself, where that is sampled.
-    """
+    """What goes on for as long as a rig is served."""
 
     now: int
+    """The time reached, in ticks."""
     seed: int
+    """Of the noise on its signals."""
     fineness: float
+    """Steps that it makes in a second by itself, where that is sampled."""
 
     @property
     def state(self) -> dict[str, float]:
@@ -41,19 +34,10 @@ class Plant(Protocol):
         """Return the rms of the noise on a signal, V; the empty one is the voltage of an output."""
 
     def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
-        """Go on to instants, a voltage held before each; return what inputs could see there.
+        """Go on to instants, a voltage held before each; return what inputs could see there, by the name of the signal.
 
-        Parameters
-        ----------
-        instants : ndarray, shape (sample,)
-            Ticks, ascending, after `now`.
-        volts : ndarray, shape (sample,)
-            Of the output that drives it, until each instant.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (sample,)
-            By the name of the signal.
+        Instants are ticks, ascending, after `now`; volts are of the output that drives it, until each instant. All have
+        shape (sample,).
         """
 
     def begin_anew(self, tick: int) -> None:

@@ -19,16 +19,8 @@ _GAP = 1.5
 class Track:
     """A channel of a recording as a function of time: straight from sample to sample, held over gaps and at the ends.
 
-    Parameters
-    ----------
-    channel : Channel
-    begin : float
-        Its time at which the playback begins, s.
-    factor : float
-        V for a unit of the channel, or 1.
+    Playback begins at the channel's time `begin`, s; the factor is V for a unit of the channel, or 1.
 
-    Examples
-    --------
     >>> from vibroimpact.analysis.recording import TimeAxis
     >>> axis = TimeAxis(np.array([0.0, 1.0, 2.0, 5.0]), 1.0)
     >>> flags = np.zeros(4, dtype=np.uint8)
@@ -65,21 +57,8 @@ class Track:
 class Playback:
     """A recording on the inputs of a device; it begins with the first edge of each input task, and holds its end.
 
-    Parameters
-    ----------
-    settings : RigSettings
-
-    Attributes
-    ----------
-    now : int
-        The time reached, in ticks.
-
-    Raises
-    ------
-    DatasetError
-        The file is no recording.
-    UsageError
-        An input is wired to a channel that it does not have, or whose unit needs an amplification.
+    The time reached is `now`, in ticks. A file that is no recording raises DatasetError. An input wired to a missing
+    channel, or to one whose unit needs an amplification, raises UsageError.
     """
 
     def __init__(self, settings: RigSettings) -> None:

@@ -13,42 +13,28 @@ TIMEBASE = 100e6
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What a device can do.
-
-    Attributes
-    ----------
-    product : str
-    category : int
-        NI's number of the kind of product.
-    bits : int
-        Of inputs and outputs.
-    inputs, outputs : int
-        Analog channels.
-    ranges : tuple of float
-        Input ranges, V, each to both sides of 0; the smallest first.
-    output_range : float
-        V, to both sides of 0.
-    conversion_rate : float
-        Samples per second: of all channels together where they are multiplexed, of each where not.
-    simultaneous : bool
-        Whether all channels are sampled at once.
-    output_rate : float
-        Samples per second and channel.
-    sees_outputs : bool
-        Whether inputs inside the device measure its outputs, as `Dev1/_ao0_vs_aognd`.
-    """
+    """What a device can do."""
 
     product: str
     category: int
+    """NI's number of the kind of product."""
     bits: int
+    """Of inputs and outputs."""
     inputs: int
     outputs: int
+    """Analog channels, as `inputs`."""
     ranges: tuple[float, ...]
+    """Input ranges, V, each to both sides of 0; the smallest first."""
     output_range: float
+    """V, to both sides of 0."""
     conversion_rate: float
+    """Samples per second: of all channels together where they are multiplexed, of each where not."""
     simultaneous: bool
+    """Whether all channels are sampled at once."""
     output_rate: float
+    """Samples per second and channel."""
     sees_outputs: bool
+    """Whether inputs inside the device measure its outputs, as `Dev1/_ao0_vs_aognd`."""
 
     def highest_rate(self, channels: int) -> float:
         """Return the highest sample rate of so many inputs, Hz."""
@@ -58,8 +44,6 @@ class Profile:
     def clock_rate(rate: float, highest: float) -> float:
         """Return the rate of the sample clock that is nearest to a rate and not above the highest one, Hz.
 
-        Examples
-        --------
         >>> round(Profile.clock_rate(44_100.0, 1e6), 1), Profile.clock_rate(5000.0, 1e6)
         (44091.7, 5000.0)
         """
@@ -74,8 +58,6 @@ class Profile:
     def input_range(self, low: float, high: float) -> float | None:
         """Return the smallest range that holds an interval of voltages; None where there is none.
 
-        Examples
-        --------
         >>> PROFILES["labpc+"].input_range(-0.3, 0.2)
         0.5
         """

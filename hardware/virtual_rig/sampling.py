@@ -20,20 +20,7 @@ Seen = Callable[[str, Ticks], Floats]
 
 
 class Sampling:
-    """The analog side of a device.
-
-    Parameters
-    ----------
-    settings : RigSettings
-    profile : Profile
-    plant : Plant
-
-    Attributes
-    ----------
-    held : ndarray, shape (output,)
-        V of the outputs now.
-    inputs : Inputs
-    """
+    """The analog side of a device; `held` are the V of the outputs now, shape (output,)."""
 
     def __init__(self, settings: RigSettings, profile: Profile, plant: Plant) -> None:
         self._wiring, self._plant = settings.wiring, plant

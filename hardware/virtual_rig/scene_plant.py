@@ -23,21 +23,8 @@ MOST_STEPS = 100_000
 class ScenePlant:
     """A scene that goes on for as long as the rig is served.
 
-    Parameters
-    ----------
-    settings : RigSettings
-
-    Attributes
-    ----------
-    now : int
-        The time reached, in ticks.
-    state : dict of str to float
-        V of its channels then.
-
-    Raises
-    ------
-    SceneError, UsageError
-        The scene is wrong, or no plant: a chain, components, a replay, a base that moves, or without what is wired.
+    The time reached is `now`, in ticks, and `state` the V of its channels then. SceneError, UsageError: the scene is
+    wrong, or no plant: a chain, components, a replay, a base that moves, or without what is wired.
     """
 
     def __init__(self, settings: RigSettings) -> None:

@@ -26,24 +26,9 @@ THREADS = 64
 
 
 class RigServer:
-    """A virtual rig that is served until it is closed.
+    """A virtual rig that is served until it is closed, at `address`, `host:port`; port 0 is any free one.
 
-    Parameters
-    ----------
-    settings : RigSettings
-    port : int
-        0: any free one.
-
-    Attributes
-    ----------
-    address : str
-        `host:port`.
-    board : Board
-
-    Raises
-    ------
-    SceneError, UsageError
-        The plant is none, the port is taken, or this machine lacks what a rig needs.
+    SceneError, UsageError: the plant is none, the port is taken, or this machine lacks what a rig needs.
     """
 
     def __init__(self, settings: RigSettings, port: int = 0) -> None:

@@ -55,15 +55,7 @@ class RigTable(BaseModel):
 
 
 class RigSettings(BaseModel):
-    """A virtual rig.
-
-    Attributes
-    ----------
-    source : str
-        Its file.
-    rig : RigTable
-    wiring : Wiring
-    """
+    """A virtual rig; `source` is its file."""
 
     model_config = ConfigDict(frozen=True)
 

@@ -9,14 +9,7 @@ FIRST_EDGE = 10_000
 
 
 class Terminals:
-    """Starts tasks by the clocks and triggers of others.
-
-    Parameters
-    ----------
-    device : str
-    tasks : dict of str to Task
-        Of the device, by their names.
-    """
+    """Starts the tasks of a device, given by their names, by the clocks and triggers of others."""
 
     def __init__(self, device: str, tasks: dict[str, Task]) -> None:
         self._device, self._tasks = device, tasks

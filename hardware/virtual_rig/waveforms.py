@@ -14,18 +14,9 @@ _SECONDS_TO_1970 = 2_082_844_800
 
 
 def put_waveforms(response: Any, task: Task, volts: Floats, mode: int, served_at: float) -> None:
-    """Put samples into a response.
+    """Put samples just read from a task, shape (channel, sample), into a response.
 
-    Parameters
-    ----------
-    response : message
-    task : Task
-        From which they were just read.
-    volts : ndarray, shape (channel, sample)
-    mode : int
-        What is wanted beside the samples.
-    served_at : float
-        Time at which the rig was at 0, s since 1970.
+    `mode` is what is wanted beside the samples; the rig was at 0 at `served_at`, s since 1970.
     """
     count = volts.shape[1]
     for place, channel in enumerate(task.channels):

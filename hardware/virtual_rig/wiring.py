@@ -32,37 +32,24 @@ class WireTable(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """What an input is wired to.
-
-    Attributes
-    ----------
-    signal : str
-        A channel of the plant; empty: an output.
-    amplification : float or None
-        V for a unit of the signal; None: not given.
-    output : int or None
-        The output that it is wired to.
-    """
+    """What an input is wired to."""
 
     signal: str
+    """A channel of the plant; empty: an output."""
     amplification: float | None = None
+    """V for a unit of the signal; None: not given."""
     output: int | None = None
+    """The output that it is wired to."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What is wired to what.
-
-    Attributes
-    ----------
-    driver : int or None
-        The output that drives the exciter.
-    inputs : dict of int to Wire
-        By the number of the input.
-    """
+    """What is wired to what."""
 
     driver: int | None = None
+    """The output that drives the exciter."""
     inputs: dict[int, Wire] = field(default_factory=dict)
+    """By the number of the input."""
 
     @property
     def signals(self) -> list[str]:
@@ -71,18 +58,10 @@ class Wiring:
 
 
 def wiring_of(raw: object, device: str, played: bool, problems: list[Problem]) -> Wiring | None:
-    """Return the wiring of a document; None, and its problems added to the list, where it is none.
+    """Return the wiring of a document's `wiring`; None, and its problems added to the list, where it is none.
 
-    Parameters
-    ----------
-    raw : object
-        What the document has at `wiring`.
-    device : str
-        Of `PROFILES`.
-    played : bool
-        The plant is a recording: its channels are not known here, and no output drives it.
-    problems : list of Problem
-        Grows.
+    The device is one of `PROFILES`. Of a plant that is a recording (`played`) the channels are not known here, and no
+    output drives it.
     """
     if not isinstance(raw, dict):
         problems.append(Problem("wiring", "a table", quoted(raw), "Write [wiring]."))
