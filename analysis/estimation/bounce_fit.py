@@ -40,54 +40,36 @@ _DEGREE = 4
 
 @dataclass(frozen=True, slots=True)
 class BounceFit:
-    """Parabolas of one acceleration between neighbouring instants.
-
-    Attributes
-    ----------
-    instants : ndarray of float, shape (instant,)
-        Starts and ends of flights, s; the first and the last one lie outside the samples.
-    stop, acceleration : float
-        In the coordinate of an upper stop, unit of the displacement (per s^2).
-    covariance : ndarray of float, shape (2 + instant, 2 + instant)
-        Of stop, acceleration, instants, per variance of the noise.
-    square : float
-        Sum of squared residuals.
-    fitted : ndarray of float, shape (sample,)
-    """
+    """Parabolas of one acceleration between neighbouring instants."""
 
     instants: Floats
+    """Starts and ends of flights, s, shape (instant,); the first and the last one lie outside the samples."""
     stop: float
     acceleration: float
+    """`stop` and `acceleration`: coordinate of an upper stop, unit of the displacement (per s^2)."""
     covariance: Floats
+    """Of stop, acceleration, instants, per variance of the noise; shape (2 + instant, 2 + instant)."""
     square: float
+    """Sum of squared residuals."""
     fitted: Floats
+    """Shape (sample,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class FittedBounces:
-    """The flights of a record, and how well parabolas of one acceleration follow them.
-
-    Attributes
-    ----------
-    signal : Signal
-        Mirrored where the stop is a lower one.
-    index : ndarray of int, shape (sample,)
-        Samples of the flights.
-    fit : BounceFit
-    noise : float
-        Standard deviation of the residuals.
-    excess : float
-        Variance that polynomials of single flights take from the residuals, over that of the noise; 1 by chance.
-    adequate : bool
-        Whether chance explains the excess.
-    """
+    """The flights of a record, and how well parabolas of one acceleration follow them."""
 
     signal: Signal
+    """Mirrored where the stop is a lower one."""
     index: NDArray[np.intp]
+    """Samples of the flights, shape (sample,)."""
     fit: BounceFit
     noise: float
+    """Standard deviation of the residuals."""
     excess: float
+    """Variance that polynomials of single flights take from the residuals, over that of the noise; 1 by chance."""
     adequate: bool
+    """Whether chance explains the excess."""
 
     @property
     def covariance(self) -> Floats:
@@ -99,12 +81,7 @@ class FittedBounces:
 def fitted_bounces(raw: Signal, side: str | None) -> FittedBounces | None:
     """Return the longest chain of flights in a record, all fitted together; None where there is none.
 
-    Parameters
-    ----------
-    raw : Signal
-        Not mirrored.
-    side : str or None
-        `upper` or `lower` stop; None: as the flights show.
+    The signal is not mirrored; the side is that of an `upper` or `lower` stop, None as the flights show.
     """
     plain = np.flatnonzero(raw.good)
     points = points_of(raw.time[plain], raw.values[plain])
@@ -181,14 +158,8 @@ def fit_bounces(
 ) -> BounceFit | None:
     """Fit stop, acceleration and instants by least squares (Gauss-Newton); None where flights vanish.
 
-    Parameters
-    ----------
-    time, values : ndarray of float, shape (sample,)
-        s, unit of the displacement, whose stop is an upper one.
-    instants : ndarray of float, shape (instant,)
-        Start values, s.
-    stop, acceleration : float
-        Start values.
+    Time is in s, shape (sample,), values are displacements with an upper stop. Instants (s), stop and acceleration are
+    start values.
     """
     unknown = np.concatenate([[stop, acceleration], instants])
     fitted = _motion(time, unknown)

@@ -34,34 +34,23 @@ _LEAST_KNOWN = 0.1
 
 @dataclass(frozen=True, slots=True)
 class BounceFlights:
-    """Successive flights, each shorter than the one before.
-
-    Attributes
-    ----------
-    lengths : ndarray of float, shape (flight,)
-        s.
-    covariance : ndarray of float, shape (flight, flight)
-        Of the logarithms of the lengths: neighbours share the error of an instant.
-    acceleration : float
-        Towards the stop, unit of the channel per s^2; 0 where no flight shows it.
-    impact_times : ndarray of float, shape (impact,)
-        Those that were seen, s.
-    stop_position, stop_error, stop_freedom : float
-        As measured, unit of the channel; standard error and its degrees of freedom.
-    fitted : ndarray of float, shape (sample,)
-        Motion of constant acceleration that is nearest to the flights; NaN elsewhere.
-    facts : dict
-    doubts : tuple of Doubt
-    """
+    """Successive flights, each shorter than the one before."""
 
     lengths: Floats
+    """s, shape (flight,)."""
     covariance: Floats
+    """Of the logarithms of the lengths: neighbours share the error of an instant."""
     acceleration: float
+    """Towards the stop, unit of the channel per s^2; 0 where no flight shows it."""
     impact_times: Floats
+    """Those that were seen, s, shape (impact,)."""
     stop_position: float
+    """As measured, unit of the channel."""
     stop_error: float
     stop_freedom: float
+    """Degrees of freedom of the standard error."""
     fitted: Floats
+    """Motion of constant acceleration that is nearest to the flights, shape (sample,); NaN elsewhere."""
     facts: dict[str, float | str]
     doubts: tuple[Doubt, ...] = ()
 
@@ -74,21 +63,10 @@ class BounceFlights:
 
 
 def flights_of(channel: Channel, side: str | None, window: float | None) -> BounceFlights:
-    """Return the flights of a channel.
+    """Return the flights of a channel of displacement at an `upper` or `lower` stop; None: as the flights show.
 
-    Parameters
-    ----------
-    channel : Channel
-        Displacement.
-    side : str or None
-        `upper` or `lower` stop; None: as the flights show.
-    window : float or None
-        Of the one-sided fits at kinks, s, which then are taken; None: parabolas, else kinks with a window that suits.
-
-    Raises
-    ------
-    EstimationError
-        The channel is no displacement, or no impacts were found.
+    The window is that of one-sided fits at kinks, s; None: parabolas, else kinks with a window that suits. Another
+    channel, or one without impacts, raises EstimationError.
     """
     refuse_other_quantities(channel)
     if window is not None:

@@ -32,28 +32,19 @@ Estimator = Callable[["Resampled", HalfEnergies, Drawn], Mapping[str, Floats]]
 
 @dataclass(frozen=True, slots=True)
 class Resampled:
-    """Energies of a record, of its noiseless motion and of draws about it.
-
-    Attributes
-    ----------
-    balance : EnergyBalance
-        With the window that suits the noise.
-    parameters : Parameters
-        What the methods take as known.
-    measured, exact, drawn : HalfEnergies
-    varied : mapping of str to ndarray, shape (draw,)
-        Parameters from the weak form, which vary with the noise of the draws.
-    window : float
-        Of the smoothing, s.
-    """
+    """Energies of a record, of its noiseless motion and of draws about it."""
 
     balance: EnergyBalance
+    """With the window that suits the noise."""
     parameters: Parameters
+    """What the methods take as known."""
     measured: HalfEnergies
     exact: HalfEnergies
     drawn: HalfEnergies
     varied: Drawn
+    """Parameters from the weak form, shape (draw,), which vary with the noise of the draws."""
     window: float
+    """Of the smoothing, s."""
 
 
 def resample(record: Prepared, draws: int, seed: int) -> Resampled:
@@ -96,20 +87,8 @@ def with_intervals(
 ) -> dict[str, MethodEstimate]:
     """Return an energy estimator's values less their systematic part, with standard errors and intervals.
 
-    Parameters
-    ----------
-    resampled : Resampled
-    confidence : float
-        Of the intervals.
-    inflation : float
-        Factor of the standard errors, for noise that is not white.
-    estimator : callable
-        From resampled record, energies and drawn values to values by name, shape (draw,).
-
-    Raises
-    ------
-    EstimationError
-        As the estimator's, or it fails on more than a tenth of the draws.
+    The inflation widens standard errors, for noise that is not white. The estimator returns values by name, shape
+    (draw,); its EstimationError is raised, or one if more than a tenth of the draws fail.
     """
     from scipy.stats import t as student
 

@@ -38,66 +38,44 @@ _SLOW = 0.04
 
 @dataclass(frozen=True, slots=True)
 class HalfMaps:
-    """The weights of a flight's samples in the quantities of one half.
-
-    Attributes
-    ----------
-    sign : float
-        1 before an impact (from the deepest point to the end), -1 after one.
-    edge : float
-        Time of the impact, s.
-    edge_value, edge_slope, deepest : ndarray, shape (sample,)
-        Spline's value and slope at the impact, and its value at the deepest point.
-    waves : ndarray, shape (2, sample)
-        Omega int y sin and Omega int y cos over the half: what int cos y' and -int sin y' have beside their ends.
-    speeds : ndarray, shape (node, sample)
-        Slopes, times the root of the weights of their squares: D = sum of squares.
-    turning : float
-        Time of the deepest point, s.
-    """
+    """The weights of a flight's samples in the quantities of one half."""
 
     sign: float
+    """1 before an impact (from the deepest point to the end), -1 after one."""
     edge: float
+    """Time of the impact, s."""
     edge_value: Floats
     edge_slope: Floats
+    """Spline's value and slope at the impact; shape (sample,), as `deepest`."""
     deepest: Floats
+    """Spline's value at the deepest point."""
     waves: Floats
+    """Omega int y sin and Omega int y cos, shape (2, sample): int cos y' and -int sin y' beside their ends."""
     speeds: Floats
+    """Slopes, times the root of the weights of their squares, shape (node, sample): D = sum of squares."""
     turning: float
+    """Time of the deepest point, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class HalfEnergies:
     """Energies of half orbits, for one set of samples or for many draws; shape (draw, half) each.
 
-    Attributes
-    ----------
-    elastic : ndarray
-        y_m^2 - y_s^2.
-    work_cos, work_sin : ndarray
-        int cos(Omega t) y' dt and int -sin(Omega t) y' dt from the deepest point to the impact, or from the impact
-        to the deepest point with the other sign: what adds to the speed at the impact.
-    drag : ndarray
-        int y'^2 dt with the sign of its effect on the speed at the impact: negative after one.
-    speed_squared : ndarray
-        Square of the measured slope at the impact.
+    The works are int cos(Omega t) y' dt and int -sin(Omega t) y' dt from the deepest point to the impact, or from the
+    impact to the deepest point with the other sign: what adds to the speed at the impact.
     """
 
     elastic: Floats
+    """y_m^2 - y_s^2."""
     work_cos: Floats
     work_sin: Floats
     drag: Floats
+    """int y'^2 dt with the sign of its effect on the speed at the impact: negative after one."""
     speed_squared: Floats
+    """Square of the measured slope at the impact."""
 
     def energy(self, p: Parameters, drawn: Drawn | None = None) -> Floats:
-        """Return V^2 before impacts and (r V)^2 after them, from the half orbits alone.
-
-        Parameters
-        ----------
-        p : Parameters
-        drawn : mapping or None
-            Values that differ between draws, by name, shape (draw,).
-        """
+        """Return V^2 before impacts and (r V)^2 after them, from the half orbits; `drawn` values have shape (draw,)."""
         value = _values(p, drawn)
         square = value["natural_frequency"] ** 2
         work = value["static_deflection"] * self.work(value["phase"])
@@ -120,14 +98,7 @@ def _values(p: Parameters, drawn: Drawn | None) -> dict[str, Floats]:
 class EnergyBalance:
     """The half orbits of all flights of a record, ready for its samples or for other draws of their noise.
 
-    Parameters
-    ----------
-    signal : Signal
-    flights : sequence of Flight
-    angular_frequency : float
-        Of the force, rad/s.
-    window : float
-        Of the smoothing, s.
+    The angular frequency is that of the force, rad/s, the window that of the smoothing, s.
     """
 
     def __init__(
@@ -154,14 +125,8 @@ class EnergyBalance:
     def energies(self, samples: Floats, parameters: Parameters, stop_position: float | None) -> HalfEnergies:
         """Return the energies of the halves, ordered after and before an impact for each flight.
 
-        Parameters
-        ----------
-        samples : ndarray, shape (draw, sample)
-            Of the whole record.
-        parameters : Parameters
-            For the offset, and to first order the acceleration at the ends.
-        stop_position : float or None
-            None: the level where flights meet.
+        Samples are of the whole record, shape (draw, sample). Parameters give the offset, and to first order the
+        acceleration at the ends. Without a stop position it is the level where flights meet.
         """
         parts = [
             samples[:, half_flight.index] - parameters.offset for half_flight in self.flights for _ in (0, 1)
@@ -219,10 +184,7 @@ class EnergyBalance:
     def restitution(self, energy: Floats) -> Floats:
         """Return r from the energies of the halves, over all impacts between flights; shape (draw,).
 
-        Raises
-        ------
-        EstimationError
-            The residual energy is negative or larger than the kinetic energy at the impacts.
+        A residual energy that is negative, or above the kinetic energy at the impacts, raises EstimationError.
         """
         before = np.sum([energy[:, 2 * one + 1] for one, _ in self.pairs], axis=0)
         after = np.sum([energy[:, 2 * other] for _, other in self.pairs], axis=0)
@@ -287,30 +249,13 @@ def unknowns_by_speed(
 ) -> tuple[Floats, float]:
     """Return what the speeds measured at the impacts say of damping or forcing, by weighted least squares.
 
-    Parameters
-    ----------
-    halves : HalfEnergies
-    p : Parameters
-        Values of what is known.
-    unknown : sequence of str
-        Of damping_ratio, static_deflection, and phase, in this order; a phase only with a static_deflection.
-    drawn : mapping or None
-        Values that differ between draws, by name, shape (draw,).
-    squares : ndarray, shape (half,), or None
-        Squares of the speeds without noise, for the weights: by its own noise a speed read too low would weigh more.
-        None: those that were measured.
+    The unknown are damping_ratio, static_deflection, and phase, in this order; a phase only with a static_deflection.
+    Values that differ between draws have shape (draw,), those returned (draw, unknown). The condition is the ratio of
+    the largest to the smallest singular value of the columns, each scaled to 1. Nearly dependent columns, as for P(1,1)
+    with more than two unknowns, raise EstimationError.
 
-    Returns
-    -------
-    values : ndarray, shape (draw, unknown)
-        In the order given.
-    condition : float
-        Ratio of the largest to the smallest singular value of the columns, each scaled to 1.
-
-    Raises
-    ------
-    EstimationError
-        The columns are nearly dependent, as for P(1,1) with more than two unknowns.
+    `squares` of the speeds without noise, shape (half,), are for the weights: by its own noise a speed read too low
+    would weigh more. None: those that were measured.
     """
     value = _values(p, drawn)
     square, drag = value["natural_frequency"] ** 2, -4.0 * value["natural_frequency"] * halves.drag
@@ -350,26 +295,9 @@ def sensitivities(
 ) -> dict[str, float]:
     """Return how errors of the speed V, or of a known damping ratio, move the estimates of P(1,1).
 
-    From V^2 (1 - r^2) / 2 = fe - 2 zeta wn D and thesis eq. 4.14, D over the flight and D* from its deepest point on.
+    From V^2 (1 - r^2) / 2 = fe - 2 zeta wn D and thesis eq. 4.14, D (`drag`) over the flight and D* (`half_drag`) from
+    its deepest point on; the natural frequency is in rad/s.
 
-    Parameters
-    ----------
-    restitution, speed : float
-        r and V.
-    drag, half_drag : float
-        D and D*.
-    natural_frequency : float
-        rad/s.
-
-    Returns
-    -------
-    dict
-        `restitution_per_relative_velocity` (damping known), `restitution_per_damping_ratio_velocity_measured`,
-        `restitution_per_damping_ratio_velocity_from_half_orbit`, `joint_damping_ratio_per_relative_velocity`,
-        `joint_restitution_per_relative_velocity`.
-
-    Examples
-    --------
     >>> found = sensitivities(0.8, 2.0, 3.0, 1.5, 10.0)
     >>> round(found["restitution_per_relative_velocity"], 12)
     0.45

@@ -36,26 +36,17 @@ _REACH = 0.1
 
 @dataclass(frozen=True, slots=True)
 class FittedFlight:
-    """A flight as the exact flow has it.
-
-    Attributes
-    ----------
-    flight : Flight
-    state : ndarray, shape (2,)
-        Displacement from the offset and velocity at the start.
-    gain : ndarray, shape (2, sample)
-        The state's least-squares weights of the samples.
-    to_end : ndarray, shape (2, 3)
-        End state = to_end[:, :2] @ state + to_end[:, 2].
-    residual : ndarray, shape (sample,)
-        Samples minus fit.
-    """
+    """A flight as the exact flow has it."""
 
     flight: Flight
     state: Floats
+    """Displacement from the offset and velocity at the start, shape (2,)."""
     gain: Floats
+    """The state's least-squares weights of the samples, shape (2, sample)."""
     to_end: Floats
+    """End state = to_end[:, :2] @ state + to_end[:, 2]."""
     residual: Floats
+    """Samples minus fit, shape (sample,)."""
 
     @property
     def end_state(self) -> Floats:
@@ -76,22 +67,14 @@ def fit_flight(signal: Signal, flight: Flight, parameters: Parameters) -> Fitted
 
 @dataclass(frozen=True, slots=True)
 class FlightSearch:
-    """Parameters with which the exact flow is nearest to all flights, each from a free start state.
-
-    Attributes
-    ----------
-    parameters : Parameters
-    names : tuple of str
-        Those that were free.
-    covariance : ndarray, shape (name, name)
-    influence : list of ndarray, shape (name, sample)
-        Change of the parameters for a change of the samples of each flight, to first order.
-    """
+    """Parameters with which the exact flow is nearest to all flights, each from a free start state."""
 
     parameters: Parameters
     names: tuple[str, ...]
+    """Those that were free."""
     covariance: Floats
     influence: list[Floats]
+    """Change of the parameters for a change of the samples of each flight, to first order; shape (name, sample)."""
 
 
 def search_flights(
@@ -99,12 +82,7 @@ def search_flights(
 ) -> FlightSearch:
     """Return the least squares of all samples of the flights, near a start: maximum likelihood for white noise.
 
-    Parameters
-    ----------
-    start : Parameters
-        Near the answer, as the weak form gives it.
-    names : sequence of str
-        What is free.
+    The start is near the answer, as the weak form gives it; the names are what is free.
     """
     coordinates = Coordinates(tuple(names), start)
     origin = coordinates.of(start)
@@ -173,21 +151,16 @@ def flow_of(time: Floats, flight: Flight, parameters: Parameters) -> tuple[Float
 
 @dataclass(frozen=True, slots=True)
 class ImpactReading:
-    """What the fitted flights say of the impacts.
-
-    Attributes
-    ----------
-    restitution, impact_velocity, stop_position : float
-        Restitution by least squares of the velocities after on those before; root mean square of V; mean level where
-        flights meet (the given stop where it is known).
-    periodic : bool
-        There was no impact with a flight on both sides: P(1,1) was assumed.
-    """
+    """What the fitted flights say of the impacts."""
 
     restitution: float
+    """By least squares of the velocities after impacts on those before."""
     impact_velocity: float
+    """Root mean square of V."""
     stop_position: float
+    """Mean level where flights meet; the given stop where it is known."""
     periodic: bool = False
+    """There was no impact with a flight on both sides: P(1,1) was assumed."""
 
 
 def pairs_of(flights: Sequence[Flight]) -> list[tuple[int, int]]:
@@ -208,16 +181,9 @@ def read_impacts(
 ) -> ImpactReading:
     """Return restitution, speed and stop from the states at both ends of the flights.
 
-    Parameters
-    ----------
-    states, ends : ndarray, shape (flight, 2)
-        At the start and the end of each flight, displacement from the offset.
-    stop_position : float or None
-        None: where the flights meet.
-    interval : float
-        An impact is within this time of where the flights were cut, s.
-    speed_noise : ndarray, shape (flight,)
-        Variance of the speed at the end of each flight: the squares of speeds have it in them, products do not.
+    States have the displacement from the offset, shape (flight, 2). Without a stop position it is where the flights
+    meet. An impact is within `interval` (s) of where the flights were cut. The speed's noise is its variance at the end
+    of each flight: the squares of speeds have it in them, products do not.
     """
     pairs = pairs_of(flights)
     periodic = pairs[0][0] == pairs[0][1]
@@ -273,12 +239,7 @@ def flights_to_level(
     """Return the flights from and to the instants at which their exact flow meets a level.
 
     All samples of a flight have a part in these; instants of kinks rest on the few samples about them, and share their
-    noise with the slopes there.
-
-    Parameters
-    ----------
-    level : float
-        From the offset.
+    noise with the slopes there. The level is from the offset.
     """
     found = []
     for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
@@ -304,14 +265,8 @@ def cut_at_level(
     """Return the flights with the samples between the instants at which their exact flow meets a level.
 
     The instant of a kink shares its noise with the samples beside it. Were these chosen by it, their noise would not be
-    0 on average, and at few samples in a flight the estimates were off by more than they state.
-
-    Parameters
-    ----------
-    level : float
-        From the offset.
-    noise : float
-        Standard deviation of the samples.
+    0 on average, and at few samples in a flight the estimates were off by more than they state. The level is from the
+    offset, the noise the standard deviation of the samples.
     """
     found = []
     for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
@@ -343,22 +298,14 @@ def _speed_noise(fitted: Sequence[FittedFlight], p: Parameters, noise: float) ->
 
 @dataclass(frozen=True, slots=True)
 class FlightFit:
-    """All flights fitted.
-
-    Attributes
-    ----------
-    reading : ImpactReading
-    standard_errors : dict
-        Of restitution, impact_velocity and stop_position, with the doubt of the parameters in them.
-    fitted : list of FittedFlight
-    noise : float
-        Standard deviation of the noise that the residuals show.
-    """
+    """All flights fitted."""
 
     reading: ImpactReading
     standard_errors: dict[str, float]
+    """Of restitution, impact_velocity and stop_position, with the doubt of the parameters in them."""
     fitted: list[FittedFlight]
     noise: float
+    """Standard deviation of the noise that the residuals show."""
 
 
 _READ = ("restitution", "impact_velocity", "stop_position")
@@ -374,12 +321,8 @@ def fit_flights(
 ) -> FlightFit:
     """Fit all flights and read the impacts, with standard errors to first order in the noise.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The parameters that were estimated from the same samples ...
-    influence : sequence of ndarray, shape (name, sample)
-        ... and how: their change for a change of the samples of each flight.
+    The names are parameters estimated from the same samples; the influence is their change for a change of the samples
+    of each flight, shape (name, sample).
     """
     fitted = [fit_flight(signal, flight, parameters) for flight in flights]
     states = np.array([one.state for one in fitted])

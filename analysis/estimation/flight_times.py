@@ -209,8 +209,6 @@ def natural_frequency_of(stop_position: float, deepest: float, flight_time: floa
     wn = (2 pi / T) arccos(-a / x_m) / pi: a stop position, x_m > |a| deepest excursion, both from rest, T flight time
     (thesis eq. 2.35). For driven or damped motion it is biased, by several percent: a start value.
 
-    Examples
-    --------
     >>> round(natural_frequency_of(0.0, 1.0, 1.0), 12)  # half of each swing is missing
     3.14159265359
     """
@@ -220,8 +218,6 @@ def natural_frequency_of(stop_position: float, deepest: float, flight_time: floa
 def stop_position_of(natural_frequency: float, deepest: float, flight_time: float) -> float:
     """Return the stop position from rest of the same motion, the natural frequency being known.
 
-    Examples
-    --------
     >>> abs(round(stop_position_of(3.141592653589793, 1.0, 1.0), 12))
     0.0
     """
@@ -233,10 +229,7 @@ def period_one(
 ) -> dict[str, MethodEstimate]:
     """Return both start values; the stop with the natural frequency and offset that the better methods found.
 
-    Raises
-    ------
-    EstimationError
-        The motion is not P(1,1), or its deepest point is not further from rest than the stop.
+    EstimationError: the motion is not P(1,1), or its deepest point is not further from rest than the stop.
     """
     lengths = np.array([flight.duration for flight in segmentation.flights])
     typical = float(np.median(lengths))

@@ -28,13 +28,8 @@ _SLOPE_BIAS = 1.0 / 84.0
 def noise_level(values: Floats, good: Mask) -> float:
     """Return the standard deviation of white noise on a smooth signal, in its unit.
 
-    The smallest of the medians of |differences| of orders 2 to 8, each over its own noise gain: kinks touch only a
-    few differences, which the median leaves out.
-
-    Raises
-    ------
-    EstimationError
-        Fewer than 20 neighbouring good samples.
+    The smallest of the medians of |differences| of orders 2 to 8, each over its own noise gain: kinks touch only a few
+    differences, which the median leaves out. Fewer than 20 neighbouring good samples raise EstimationError.
     """
     found = []
     for order in _ORDERS:
@@ -51,18 +46,10 @@ def noise_level(values: Floats, good: Mask) -> float:
 
 
 def one_sided_window(noise: float, interval: float, size: float, fastest: float, longest: float) -> float:
-    """Return the window (s) in which a one-sided cubic has the best slope at its end.
+    """Return the window (s), at most the longest, in which a one-sided cubic has the best slope at its end.
 
-    Parameters
-    ----------
-    noise, size : float
-        Standard deviation of the noise, and amplitude of the motion.
-    interval : float
-        Of the samples, s.
-    fastest : float
-        Angular frequency of the fastest smooth part, rad/s.
-    longest : float
-        Not longer than this, s.
+    `noise` is the standard deviation, `size` the amplitude of the motion, `interval` that of the samples, s, `fastest`
+    the angular frequency of the fastest smooth part, rad/s.
     """
     count = np.arange(_FEWEST_IN_WINDOW, max(_FEWEST_IN_WINDOW + 1, int(longest / interval) + 1))
     width = count * interval

@@ -31,19 +31,13 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Means of neighbouring samples, on which a record is cut.
-
-    Attributes
-    ----------
-    time, values : ndarray of float, shape (point,)
-        s, unit of the displacement.
-    size : int
-        Samples in a mean; in means of several, one may have both sides of an impact in it.
-    """
+    """Means of neighbouring samples, on which a record is cut."""
 
     time: Floats
     values: Floats
+    """Unit of the displacement; both have shape (point,), time in s."""
     size: int
+    """Samples in a mean; in means of several, one may have both sides of an impact in it."""
 
     @property
     def skipped(self) -> int:
@@ -53,25 +47,15 @@ class Points:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Neighbouring points that one parabola follows.
-
-    Attributes
-    ----------
-    first, end : int
-        The points from `first` on, up to but without `end`.
-    coefficients : ndarray of float, shape (3,)
-        Of 1, t - middle, (t - middle)^2.
-    middle : float
-        s.
-    square : float
-        Sum of squared residuals.
-    """
+    """Neighbouring points, without `end`, that one parabola follows."""
 
     first: int
     end: int
     coefficients: Floats
+    """Of 1, t - middle, (t - middle)^2; the middle is in s."""
     middle: float
     square: float
+    """Sum of squared residuals."""
 
     @property
     def count(self) -> int:
@@ -99,14 +83,7 @@ def points_of(time: Floats, values: Floats) -> Points:
 
 
 def cuts(points: Points, noise: float) -> list[list[Piece]]:
-    """Return the pieces of a record, cut once for each factor of its noise.
-
-    Parameters
-    ----------
-    points : Points
-    noise : float
-        Standard deviation of a sample.
-    """
+    """Return the pieces of a record, cut once for each factor of its noise, the standard deviation of a sample."""
     if len(points.time) < FEWEST_IN_PIECE:
         return []
     least = _ROUNDING * float(np.ptp(points.values))

@@ -78,25 +78,17 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """All numbers of the model; the stop is an upper one (a lower one is mirrored before).
-
-    Attributes
-    ----------
-    restitution, damping_ratio : float
-    natural_frequency, angular_frequency : float
-        rad/s.
-    static_deflection, phase : float
-        Unit of the displacement, and rad.
-    stop_position, offset : float
-        Unit of the displacement.
-    """
+    """All numbers of the model; the stop is an upper one (a lower one is mirrored before)."""
 
     restitution: float
     damping_ratio: float
     natural_frequency: float
     angular_frequency: float
+    """rad/s, as the natural one."""
     static_deflection: float
+    """Unit of the displacement, as stop position and offset."""
     phase: float
+    """rad."""
     stop_position: float
     offset: float = 0.0
 
@@ -138,12 +130,7 @@ def central_differences(
 ) -> Floats:
     """Return the derivatives of a function by its arguments, shape (value, argument).
 
-    Parameters
-    ----------
-    function : callable
-    at : ndarray, shape (argument,)
-    relative, size_of_zero : float
-        The step is this part of an argument; an argument of 0 has this size.
+    The step is the `relative` part of an argument; an argument of 0 has the `size_of_zero`.
     """
     columns = []
     for k, value in enumerate(at):
@@ -155,18 +142,12 @@ def central_differences(
 
 @dataclass(frozen=True, slots=True)
 class Coordinates:
-    """The linear coordinates of some of the parameters; the others are held.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of `Parameters`: what is free.
-    held : Parameters
-        Values of the others.
-    """
+    """The linear coordinates of some of the parameters; the others are held."""
 
     names: tuple[str, ...]
+    """What is free."""
     held: Parameters
+    """Values of the others."""
 
     @property
     def both(self) -> bool:
@@ -192,17 +173,9 @@ class Coordinates:
         return self.held.with_values(self.names, numbers[0]) if there[0] else None
 
     def numbers(self, values: Floats) -> tuple[NDArray[np.bool_], Floats]:
-        """Return where the stiffness of many coordinates is positive, and there the numbers of the names.
+        """Return where the stiffness of many coordinates is positive, shape (row,), and there the numbers of the names.
 
-        Parameters
-        ----------
-        values : ndarray, shape (row, name)
-
-        Returns
-        -------
-        there : ndarray, shape (row,)
-        numbers : ndarray, shape (row, name)
-            Of no meaning elsewhere.
+        Values and numbers have shape (row, name); numbers are of no meaning elsewhere.
         """
         given = dict(zip(self.names, values.T, strict=True))
         square = given.get("natural_frequency", np.full(len(values), self.held.natural_frequency**2))
@@ -228,18 +201,8 @@ class Coordinates:
     ) -> Mapping[str, tuple[float, float]]:
         """Return intervals of parameters whose coordinates are normal: parts of draws, the same draws every time.
 
-        Parameters
-        ----------
-        p : Parameters
-            The estimate.
-        covariance : ndarray, shape (name, name)
-            Of the parameters, to first order.
-        confidence : float
-
-        Returns
-        -------
-        mapping of str to (float, float)
-            Lower and upper end; none of what the stiffness is in, where the data do not exclude a stiffness of 0.
+        The covariance, shape (name, name), is to first order. No interval has what the stiffness is in, where the data
+        do not exclude a stiffness of 0.
         """
         slope = self.derivative(p)
         values, vectors = np.linalg.eigh(slope @ covariance @ slope.T)

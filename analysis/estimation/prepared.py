@@ -41,39 +41,25 @@ _FASTER, _MUCH_FASTER = 1.05, 4.0
 
 @dataclass(slots=True)
 class Prepared:
-    """A record with what all methods share.
-
-    Attributes
-    ----------
-    forcing : Forcing
-    held : Known
-    segmentation : Segmentation
-    flights : list of Flight
-        Those that follow the model.
-    search : FlightSearch
-        What weak form and exact flow say of what is not held.
-    fit : FlightFit
-    parameters : Parameters
-        What is held, and what search and flights say of the rest.
-    left_out : int
-        Flights that do not follow the model.
-    correlation, inflation : float
-        Of neighbouring residuals, and the factor by which it widens standard errors.
-    trajectory : Trajectory or None
-        Set when it was fitted.
-    """
+    """A record with what all methods share."""
 
     forcing: Forcing
     held: Known
     segmentation: Segmentation
     flights: list[Flight]
+    """Those that follow the model."""
     search: FlightSearch
+    """What weak form and exact flow say of what is not held."""
     fit: FlightFit
     parameters: Parameters
+    """What is held, and what search and flights say of the rest."""
     left_out: int
+    """Flights that do not follow the model."""
     correlation: float
     inflation: float
+    """Factor by which the correlation of neighbouring residuals widens standard errors."""
     trajectory: Trajectory | None = None
+    """Set when it was fitted."""
 
     @property
     def signal(self) -> Signal:
@@ -94,12 +80,8 @@ class Prepared:
 def prepare(channel: Channel, forcing: Forcing, held: Known, window: float | None) -> Prepared:
     """Cut a record, find what the weak form says and fit the exact flow to each flight.
 
-    A natural frequency above that of the force makes the motion faster than the record was cut for: it is cut again.
-
-    Raises
-    ------
-    EstimationError
-        No impacts were found, or no flight between them follows a forced oscillator.
+    A natural frequency above that of the force makes the motion faster than the record was cut for: it is cut again. No
+    impacts, or no flight that follows a forced oscillator, raise EstimationError.
     """
     fastest = max(forcing.angular_frequency, held.natural_frequency or 0.0)
     found = _prepared(channel, forcing, held, window, fastest)

@@ -57,46 +57,30 @@ DOUBTFUL = 2.5
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """One kink.
-
-    Attributes
-    ----------
-    time, time_error : float
-        Instant and its standard error, s.
-    level : float
-        Displacement where the two sides meet.
-    before, after : float
-        Velocities of the two sides there.
-    """
+    """One kink."""
 
     time: float
     time_error: float
+    """Standard error of the instant, s."""
     level: float
+    """Displacement where the two sides meet."""
     before: float
     after: float
+    """`before` and `after`: velocities of the two sides there."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """Smooth motion between two impacts that follow each other.
-
-    Attributes
-    ----------
-    start, end : float
-        s.
-    index : ndarray of int, shape (sample,)
-        Good samples between, less those so near an impact that they may be on its other side.
-    first : int
-        Index of the impact at its start; that at its end is the next.
-    usable : bool
-        Has samples enough.
-    """
+    """Smooth motion between two impacts that follow each other, from start to end, s."""
 
     start: float
     end: float
     index: NDArray[np.intp]
+    """Good samples between, less those so near an impact that they may be on its other side; shape (sample,)."""
     first: int
+    """Index of the impact at its start; that at its end is the next."""
     usable: bool
+    """Has samples enough."""
 
     @property
     def duration(self) -> float:
@@ -106,28 +90,18 @@ class Flight:
 
 @dataclass(frozen=True, slots=True)
 class Segmentation:
-    """A signal cut at its impacts.
-
-    Attributes
-    ----------
-    signal : Signal
-    impacts : tuple of Impact
-    flights : tuple of Flight
-        Those between impacts, first to last.
-    window : float
-        Of the one-sided cubics, s.
-    stray : int
-        Kinks that are at no stop: their level is not that of the others.
-    opposite : int
-        Kinks the other way, far from all others: those of a stop on the other side.
-    """
+    """A signal cut at its impacts."""
 
     signal: Signal
     impacts: tuple[Impact, ...]
     flights: tuple[Flight, ...]
+    """Those between impacts, first to last."""
     window: float
+    """Of the one-sided cubics, s."""
     stray: int = 0
+    """Kinks that are at no stop: their level is not that of the others."""
     opposite: int = 0
+    """Kinks the other way, far from all others: those of a stop on the other side."""
 
     @property
     def stop_position(self) -> float:
@@ -142,13 +116,10 @@ class Segmentation:
 
 
 def segment_channel(channel: Channel, fastest: float, known: Known, window: float | None) -> Segmentation:
-    """Cut a channel at its impacts; see `segment`.
+    """Cut a channel at its impacts; errors are those of `segment`.
 
-    Raises
-    ------
-    EstimationError
-        As of `segment`; or the channel is no displacement: velocities jump at impacts, accelerations and forces have
-        spikes.
+    A channel that is no displacement raises EstimationError: velocities jump at impacts, accelerations and forces have
+    spikes.
     """
     refuse_other_quantities(channel)
     return segment(
@@ -172,25 +143,11 @@ def segment(
     stop_position: float | None = None,
     window: float | None = None,
 ) -> Segmentation:
-    """Find the impacts of a displacement and cut it there.
+    """Find the impacts of a displacement and cut it there; arrays have shape (sample,), time in s.
 
-    Parameters
-    ----------
-    time, values, good : ndarray, shape (sample,)
-        s, unit of the displacement, and which samples are plain measurements.
-    fastest : float
-        Angular frequency of the fastest smooth part of the motion, such as that of the force, rad/s.
-    side : str or None
-        `upper` or `lower`; None: as the kinks show.
-    stop_position : float or None
-        Where it is known.
-    window : float or None
-        Of the one-sided cubics, s; None: from the noise.
-
-    Raises
-    ------
-    EstimationError
-        Too few samples, or fewer than two impacts.
+    `fastest` is the angular frequency of the fastest smooth part of the motion, such as that of the force, rad/s. The
+    side is `upper` or `lower` (None: as the kinks show), the window that of the one-sided cubics, s (None: from the
+    noise). Too few samples, or fewer than two impacts, raise EstimationError.
     """
     noise = noise_level(values, good)
     interval = float(np.median(np.diff(time)))

@@ -17,28 +17,19 @@ _OTHER_UNITS = {"m s-1": "a velocity", "m s-2": "an acceleration", "N": "a force
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A displacement with an upper stop, mirrored where the stop is a lower one.
-
-    Attributes
-    ----------
-    time, values : ndarray of float, shape (sample,)
-        s, unit of the displacement.
-    good : ndarray of bool, shape (sample,)
-        Samples that are plain measurements.
-    interval : float
-        Mean sampling interval, s.
-    sign : float
-        -1 where the signal was mirrored, else 1.
-    noise : float
-        Standard deviation of the noise.
-    """
+    """A displacement with an upper stop, mirrored where the stop is a lower one."""
 
     time: Floats
     values: Floats
+    """Unit of the displacement; arrays have shape (sample,), time is in s."""
     good: Mask
+    """Samples that are plain measurements."""
     interval: float
+    """Mean sampling interval, s."""
     sign: float
+    """-1 where the signal was mirrored, else 1."""
     noise: float
+    """Standard deviation of the noise."""
 
     @property
     def side(self) -> str:
@@ -52,13 +43,7 @@ class Signal:
 
 
 def refuse_other_quantities(channel: Channel) -> None:
-    """Raise EstimationError unless the unit of a channel may be that of a displacement.
-
-    Raises
-    ------
-    EstimationError
-        It is a velocity, an acceleration or a force.
-    """
+    """Raise EstimationError if the unit of a channel is that of a velocity, an acceleration or a force."""
     si = measured_unit(channel.unit).si
     if si in _OTHER_UNITS:
         raise EstimationError(
@@ -70,10 +55,7 @@ def refuse_other_quantities(channel: Channel) -> None:
 def signal_of(channel: Channel) -> Signal:
     """Return a channel as a signal that is not mirrored, with its noise.
 
-    Raises
-    ------
-    EstimationError
-        Fewer than 20 neighbouring good samples.
+    Fewer than 20 neighbouring good samples raise EstimationError.
     """
     values = np.where(channel.good, channel.values, 0.0)
     interval = float(np.median(np.diff(channel.time)))

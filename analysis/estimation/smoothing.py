@@ -28,19 +28,13 @@ _FLIGHTS_TRIED = 5
 
 @dataclass(frozen=True, slots=True)
 class Smoother:
-    """The linear maps from the samples of one flight to its spline.
-
-    Attributes
-    ----------
-    flight : Flight
-    gain : ndarray, shape (coefficient, sample)
-    knots : ndarray
-        s, about the start of the flight.
-    """
+    """The linear maps from the samples of one flight to its spline."""
 
     flight: Flight
     gain: Floats
+    """Shape (coefficient, sample)."""
     knots: Floats
+    """s, about the start of the flight."""
 
     def row(self, time: Floats, order: int = 0) -> Floats:
         """Return the weights of the samples for the value, or a derivative, at times; shape (time, sample)."""
@@ -79,24 +73,9 @@ def choose_window(
     """Return the window (s) with the smallest mean square error of the slopes at the ends of flights.
 
     The motion without noise says what a window smooths away: were it chosen from the samples, their noise would choose
-    the window that suits it, and no draw of other noise would show what that does to the answer.
-
-    Parameters
-    ----------
-    motion : Signal
-        The fitted motion, without noise.
-    flights : sequence of Flight
-    fine : float
-        A window that smooths nothing of the motion away, s.
-    fastest : float
-        Angular frequency of the fastest motion, rad/s.
-    noise : float
-        Standard deviation of the samples.
-
-    Raises
-    ------
-    EstimationError
-        The flights have too few samples for a spline.
+    the window that suits it, and no draw of other noise would show what that does to the answer. A `fine` window (s)
+    smooths nothing of the motion away, `fastest` is its highest angular frequency, rad/s, `noise` the standard
+    deviation. Flights with too few samples for a spline raise EstimationError.
     """
     tried = flights[:_FLIGHTS_TRIED]
     exact = [_end_slopes(smoother(motion, flight, fine)) @ motion.values[flight.index] for flight in tried]

@@ -45,47 +45,30 @@ _MOST_ODD = 0.34
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Samples that are followed from one start state.
-
-    Attributes
-    ----------
-    index : ndarray of int, shape (sample,)
-        The good samples.
-    state : tuple of float
-        Displacement from the offset and velocity at the first of them.
-    impacts : int
-        Detected in it.
-    """
+    """Samples that are followed from one start state."""
 
     index: NDArray[np.intp]
+    """The good samples, shape (sample,)."""
     state: tuple[float, float]
+    """Displacement from the offset and velocity at the first of them."""
     impacts: int
+    """Detected in it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """What the fit found.
-
-    Attributes
-    ----------
-    parameters : Parameters
-    names : tuple of str
-        Estimated, in the order of `covariance`.
-    covariance : ndarray, shape (name, name)
-    noise : float
-        Standard deviation of the residual.
-    adequate : bool
-        The residual is not much larger than the noise of the single flights.
-    pieces : tuple of Piece
-        With their fitted start states.
-    """
+    """What the fit found."""
 
     parameters: Parameters
     names: tuple[str, ...]
+    """Estimated, in the order of `covariance`."""
     covariance: Floats
     noise: float
+    """Standard deviation of the residual."""
     adequate: bool
+    """The residual is not much larger than the noise of the single flights."""
     pieces: tuple[Piece, ...]
+    """With their fitted start states."""
 
 
 def follow(
@@ -232,24 +215,10 @@ def fit_trajectory(
     free: Sequence[str],
     noise: float,
 ) -> Trajectory:
-    """Fit parameters and start states to all samples.
+    """Fit the free parameters and start states to all samples; raise EstimationError if no pieces follow the model.
 
-    Parameters
-    ----------
-    segmentation : Segmentation
-    fitted : sequence of FittedFlight
-        For the start states.
-    start : Parameters
-        Start values, and the values of what is held.
-    free : sequence of str
-        Names of the parameters that are estimated.
-    noise : float
-        Of the single flights' fits, to judge by.
-
-    Raises
-    ------
-    EstimationError
-        The model does not follow the samples with pieces of any length.
+    Fitted flights give the start states, `start` start values and what is held; `noise`, that of single flights, is
+    what the fit is judged by.
     """
     signal = segmentation.signal
     size = 0.5 * signal.range
@@ -299,17 +268,8 @@ def _scales(coordinates: Coordinates, size: float) -> list[float]:
 class PathProblem:
     """The least-squares problem: linear coordinates of the free parameters, then place and velocity of each piece.
 
-    Parameters
-    ----------
-    signal : Signal
-    pieces : list of Piece
-        With start states to begin at.
-    start : Parameters
-        Start values, and the values of what is held.
-    names : tuple of str
-        What is free.
-    size : float
-        Of the motion, in its unit: changes are counted in parts of it.
+    Changes are counted in parts of the size of the motion, in its unit. `start` has start values, and the values of
+    what is held.
     """
 
     def __init__(

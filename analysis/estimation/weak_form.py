@@ -55,31 +55,18 @@ _EXACT = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class WeightedFlight:
-    """A flight with its test functions.
-
-    Attributes
-    ----------
-    time, values : ndarray, shape (sample,)
-    weights : ndarray, shape (3, function, sample)
-        Of the samples in the integrals with w, w' and w''.
-    """
+    """A flight with its test functions."""
 
     time: Floats
     values: Floats
     weights: Floats
+    """Of the samples in the integrals with w, w' and w''; shape (3, function, sample)."""
 
 
 def weighted(time: Floats, values: Floats, functions: int, power: int = POWER) -> WeightedFlight:
     """Return a flight with its test functions s^p (1-s)^p Legendre_k(2 s - 1), s from 0 to 1 over its samples.
 
-    Parameters
-    ----------
-    time, values : ndarray, shape (sample,)
-        s and unit of the displacement; the integrals are sums by the trapezoidal rule, exact to the order of `power`.
-    functions : int
-        How many.
-    power : int
-        At least 3.
+    Integrals are sums by the trapezoidal rule, exact to the order of `power`, 3 at least; time is in s.
     """
     length = float(time[-1] - time[0])
     s = (time - time[0]) / length
@@ -129,13 +116,7 @@ def weighted_flights(signal: Signal, flights: Sequence[Flight], fastest: float) 
 def linear_estimate(flights: Sequence[WeightedFlight], known: Parameters, free: Sequence[str]) -> Parameters:
     """Return the plain linear least squares of the weak form: the start of `weak_form`.
 
-    Parameters
-    ----------
-    flights : sequence of WeightedFlight
-    known : Parameters
-        Values of all that is not free.
-    free : sequence of str
-        Of damping_ratio, natural_frequency, static_deflection, phase, offset.
+    The free are some of damping_ratio, natural_frequency, static_deflection, phase, offset; all others are known.
     """
     columns, target = _linear_system(flights, known, free)
     scale = np.linalg.norm(columns, axis=0)
@@ -204,18 +185,8 @@ def weak_form(
 ) -> tuple[Parameters, Floats]:
     """Return the G-weighted least squares of the weak form, and the mean square of each flight's whitened residuals.
 
-    Parameters
-    ----------
-    flights : sequence of WeightedFlight
-    start : Parameters
-        Start values, and the values of what is held.
-    free : sequence of str
-        Names of the parameters that are estimated.
-
-    Raises
-    ------
-    EstimationError
-        No flights, or fewer equations than unknowns, or data that do not determine them.
+    `start` also holds what is not free. No flights, fewer equations than unknowns, or data that do not determine them
+    raise EstimationError.
     """
     from scipy.optimize import least_squares
 
@@ -250,15 +221,8 @@ def robust_weak_form(
 ) -> tuple[Parameters, list[int]]:
     """Return the weak form over the flights that follow the model, and their places among all.
 
-    A flight with an impact that was not seen does not follow. The worst are left out until the misfit of all others
-    is that of noise; then all flights are judged once more.
-
-    Parameters
-    ----------
-    flights, start, free
-        As in `weak_form`; the start is for what is held.
-    noise : float
-        Standard deviation, from the samples alone.
+    A flight with an impact that was not seen does not follow. The worst are left out until the misfit of all others is
+    that of noise; then all flights are judged once more. The noise is the standard deviation, from the samples alone.
     """
     kept = list(range(len(flights)))
     fewest = max(1, math.ceil(_FEWEST_KEPT * len(flights)))
@@ -305,12 +269,8 @@ def _nearest_start(
 ) -> Parameters:
     """Return the start that most flights are nearest to: as given, linear, or linear at a held natural frequency.
 
-    Noise biases the plain linear stiffness, at many samples in a period down to below zero.
-
-    Parameters
-    ----------
-    ratios : sequence of float
-        Natural frequencies to try, over that of the force.
+    Noise biases the plain linear stiffness, at many samples in a period down to below zero. The ratios are natural
+    frequencies to try, over that of the force.
     """
     linear = [name for name in free if name != "angular_frequency"]
     if not linear:
