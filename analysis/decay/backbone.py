@@ -21,26 +21,19 @@ _SMALLEST = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Backbone:
-    """Amplitude, frequency and damping of successive windows of a decay.
-
-    Attributes
-    ----------
-    time, amplitude : ndarray of float, shape (window,)
-        Middle of the window, s, and the amplitude there, unit of the samples.
-    angular_frequency, angular_frequency_error : ndarray of float, shape (window,)
-        Undamped natural angular frequency, rad/s.
-    damping_ratio, damping_ratio_error : ndarray of float, shape (window,)
-    periods : float
-        Length of a window.
-    """
+    """Amplitude, frequency and damping of successive windows of a decay; each has shape (window,)."""
 
     time: Floats
+    """Middle of the window, s."""
     amplitude: Floats
+    """In the middle, unit of the samples."""
     angular_frequency: Floats
+    """Undamped natural angular frequency, rad/s."""
     angular_frequency_error: Floats
     damping_ratio: Floats
     damping_ratio_error: Floats
     periods: float
+    """Length of a window."""
 
     def words(self, unit: str) -> str:
         """Return how the frequency changes, as a sentence: the first window against those under a tenth of it."""
@@ -77,12 +70,8 @@ def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
 
     In each window a decaying cosine is fitted with its own frequency and decay rate; its amplitude is that of the
     middle. Nothing is filtered: a Hilbert transform would smear the start of the decay, where the amplitude is largest.
-    A window is `periods` long, by default a sixteenth of the decay, but four periods at least.
-
-    Raises
-    ------
-    EstimationError
-        Fewer than two windows can be fitted.
+    A window is `periods` long, by default a sixteenth of the decay, but four periods at least. If fewer than two
+    windows can be fitted, EstimationError is raised.
     """
     guess = first_guess(samples)
     length = 2.0 * np.pi / guess.angular_frequency

@@ -52,13 +52,9 @@ class FirstGuess:
 def first_guess(samples: DecaySamples) -> FirstGuess:
     """Return frequency, decay rate and equilibrium of the strongest oscillation.
 
-    The frequency is the highest peak of the spectrum of the samples, interpolated to an even grid, then the mean
-    slope of the phase of one-period windows; the decay rate is the slope of the logarithm of their amplitudes.
-
-    Raises
-    ------
-    EstimationError
-        Fewer than two periods are in the window, or nothing oscillates.
+    The frequency is the highest peak of the spectrum of the samples, interpolated to an even grid, then the mean slope
+    of the phase of one-period windows; the decay rate is the slope of the logarithm of their amplitudes.
+    EstimationError: fewer than two periods are in the window, or nothing oscillates.
     """
     omega = spectral_peak(samples)
     length = float(samples.time[-1] - samples.time[0])
@@ -81,13 +77,7 @@ def first_guess(samples: DecaySamples) -> FirstGuess:
 
 
 def spectral_peak(samples: DecaySamples) -> float:
-    """Return the angular frequency (rad/s) of the highest peak of the spectrum.
-
-    Raises
-    ------
-    EstimationError
-        The samples are a straight line.
-    """
+    """Return the angular frequency (rad/s) of the highest peak of the spectrum; EstimationError for a straight line."""
     count = min(len(samples.time), _MOST_GRID)
     grid = np.linspace(samples.time[0], samples.time[-1], count)
     value = np.interp(grid, samples.time, samples.value)
@@ -143,28 +133,23 @@ def _amplitudes(time: Floats, value: Floats, omega: float, decay_rate: float) ->
 
 @dataclass(frozen=True, slots=True)
 class ExponentialDecay:
-    """A fitted decaying cosine.
-
-    Attributes
-    ----------
-    amplitude, phase, offset : Estimate
-        At `reference_time` (s): unit of the samples, rad, unit of the samples.
-    angular_frequency, decay_rate : Estimate
-        Damped angular frequency omega, rad/s, and lambda, 1/s.
-    natural_angular_frequency, damping_ratio : Estimate
-        `sqrt(omega^2 + lambda^2)`, rad/s, and lambda over it.
-    fitted : ndarray of float, shape (sample,)
-    """
+    """A fitted decaying cosine."""
 
     amplitude: Estimate
     phase: Estimate
     offset: Estimate
+    """Amplitude, phase and offset at `reference_time` (s): unit of the samples, rad, unit of the samples."""
     angular_frequency: Estimate
+    """Damped angular frequency omega, rad/s."""
     decay_rate: Estimate
+    """lambda, 1/s."""
     natural_angular_frequency: Estimate
+    """`sqrt(omega^2 + lambda^2)`, rad/s."""
     damping_ratio: Estimate
+    """lambda over the natural angular frequency."""
     reference_time: float
     fitted: Floats
+    """Shape (sample,)."""
     test: ResidualTest
 
     @property

@@ -29,25 +29,19 @@ _MOST_EVALUATIONS = 60
 class LawFit:
     """A damping law with its fitted coefficients.
 
-    Attributes
-    ----------
-    law : DampingLaw
-    coefficients : mapping of str to Estimate
-        By name: `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
-        `turning_time`, the terms of the law, and `cubic` where asked for.
-    residual_sum : float
-        Sum of squares, (unit of the samples)^2.
-    fitted : ndarray of float, shape (sample,)
-    settled : bool
-        Whether the fit ended before its limit of evaluations.
+    Their names are `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
+    `turning_time`, the terms of the law, and `cubic` where asked for.
     """
 
     law: DampingLaw
     coefficients: Mapping[str, Estimate]
     residual_sum: float
+    """Sum of squares, (unit of the samples)^2."""
     fitted: Floats
+    """Shape (sample,)."""
     test: ResidualTest
     settled: bool
+    """Whether the fit ended before its limit of evaluations."""
 
     @property
     def physical(self) -> bool:
@@ -157,18 +151,13 @@ def fit_law(
 ) -> LawFit:
     """Fit a damping law by the trajectory it gives.
 
-    The equation of motion (`DampingLaw`) is integrated from turning point to turning point; nothing is averaged,
-    so that amplitude, waveform and phase all count. Coefficients are not held positive: a negative one says that
-    the data do not want this term, and where they are uncertain their interval shows it.
+    The equation of motion (`DampingLaw`) is integrated from turning point to turning point; nothing is averaged, so
+    that amplitude, waveform and phase all count. Coefficients are not held positive: a negative one says that the data
+    do not want this term, and where they are uncertain their interval shows it.
 
     `start` gives frequency, phase and equilibrium to start from, `envelope` the amplitudes from which the coefficients
     are guessed. With `cubic` a cubic stiffness (`omega0^2 mu x^3`) is fitted too: the frequency then depends on the
-    amplitude.
-
-    Raises
-    ------
-    EstimationError
-        The fit runs into damping that ends the motion before the data do.
+    amplitude. Damping that ends the motion before the data do raises EstimationError.
     """
     from scipy.optimize import least_squares
 

@@ -21,18 +21,12 @@ _DELAYS = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leakage:
-    """Cosine series of rho: a line shows `sum_j w_j (H(omega + j d) + H(omega - j d)) / 2`.
-
-    Attributes
-    ----------
-    weights : ndarray of float, shape (term,)
-        w; their sum is 1. One term: no leakage.
-    spacing : float
-        d, rad/s: half a line.
-    """
+    """Cosine series of rho: a line shows `sum_j w_j (H(omega + j d) + H(omega - j d)) / 2`."""
 
     weights: Floats = field(default_factory=lambda: np.ones(1))
+    """w, shape (term,); their sum is 1. One term: no leakage."""
     spacing: float = 0.0
+    """d, rad/s: half a line."""
 
     def seen(self, response: Callable[[Floats], Complexes], omega: Floats) -> Complexes:
         """Return the response that lines at `omega` (rad/s) show of a function of the angular frequency."""
@@ -50,15 +44,8 @@ NO_LEAKAGE = Leakage()
 def leakage_of(drive: Floats, window: Floats, interval: float, driven: float) -> Leakage:
     """Return the leakage of spectra by segments that overlap by half.
 
-    Parameters
-    ----------
-    drive : ndarray of float, shape (sample,)
-        Evenly spaced, without its mean.
-    window : ndarray of float, shape (segment,)
-    interval : float
-        s.
-    driven : float
-        Power of a line, relative to the largest, above which its rho counts.
+    The drive is evenly spaced, an interval (s) apart, and without its mean. The rho of a line counts where its power,
+    relative to the largest, is above `driven`.
     """
     from scipy.fft import dct
     from scipy.signal import csd, welch

@@ -45,13 +45,10 @@ _COS, _SIN = np.cos(_ANGLE)[:, None], np.sin(_ANGLE)[:, None]
 
 @dataclass(frozen=True, slots=True)
 class Coefficients:
-    """Coefficients of the motion, one column for each variant that is computed along.
+    """Coefficients of the motion, shape (column,), one column for each variant that is computed along.
 
-    Attributes
-    ----------
-    angular_frequency, viscous, coulomb, quadratic, cubic : ndarray of float, shape (column,)
-        omega0 (rad/s), lambda (1/s), c (unit/s^2), q (1/unit), mu (1/unit^2) of
-        `x'' + omega0^2 x (1 + mu x^2) = -2 lambda x' - c sign(x') - q x' |x'|`.
+    omega0 (rad/s), lambda (1/s), c (unit/s^2), q (1/unit), mu (1/unit^2), in the order of the fields, of `x'' +
+    omega0^2 x (1 + mu x^2) = -2 lambda x' - c sign(x') - q x' |x'|`.
     """
 
     angular_frequency: Floats
@@ -166,21 +163,11 @@ def _rest(height: Floats, known: Coefficients) -> tuple[Floats, ...]:
 
 
 def decaying_motion(start: Floats, amplitude: Floats, coefficients: Coefficients, time: Floats) -> Floats:
-    """Return displacements from the equilibrium, after a turning point.
+    """Return displacements from the equilibrium, after a turning point, shape (sample, column).
 
-    Quintic Hermite interpolation between nodes that are at most a twentieth of a period apart: errors of
-    1e-7 of the amplitude.
-
-    Parameters
-    ----------
-    start, amplitude, coefficients : shape (column,)
-        Instant (s) and displacement (positive) of the turning point, and what moves the body after it.
-    time : ndarray of float, shape (sample,)
-        s, ascending; instants shortly before the start are extrapolated.
-
-    Returns
-    -------
-    ndarray of float, shape (sample, column)
+    Quintic Hermite interpolation between nodes that are at most a twentieth of a period apart: errors of 1e-7 of the
+    amplitude. Start (s), amplitude (positive) and coefficients have shape (column,), the ascending time (s) has shape
+    (sample,); instants shortly before the start are extrapolated.
     """
     nodes = half_swings(start, amplitude, coefficients, float(time[-1]))
     return np.column_stack([_interpolated(nodes, column, time) for column in range(len(start))])

@@ -19,32 +19,24 @@ _FEWEST_LAGS, _MOST_LAGS = 10, 400
 
 @dataclass(frozen=True, slots=True)
 class ResidualTest:
-    """What the residual of a fit looks like.
-
-    Attributes
-    ----------
-    rms, noise_floor, structure : float
-        Root mean square of the residual; of its white part, from second differences; of the rest.
-    relative_structure : float
-        The structure as a fraction of the largest excursion of the measured motion.
-    lags : int
-        Lags of the Ljung-Box test.
-    portmanteau_probability : float
-        That white noise shows such autocorrelations (Ljung-Box).
-    runs_probability : float
-        That white noise changes its sign so rarely, or so often (Wald-Wolfowitz, two-sided).
-    effective_samples : float
-        Independent samples that say as much about the oscillation as these do.
-    """
+    """What the residual of a fit looks like."""
 
     rms: float
+    """Root mean square of the residual."""
     noise_floor: float
+    """Root mean square of its white part, from second differences."""
     structure: float
+    """Root mean square of the rest."""
     relative_structure: float
+    """The structure as a fraction of the largest excursion of the measured motion."""
     lags: int
+    """Lags of the Ljung-Box test."""
     portmanteau_probability: float
+    """That white noise shows such autocorrelations (Ljung-Box)."""
     runs_probability: float
+    """That white noise changes its sign so rarely, or so often (Wald-Wolfowitz, two-sided)."""
     effective_samples: float
+    """Independent samples that say as much about the oscillation as these do."""
 
     @property
     def adequate(self) -> bool:
@@ -83,16 +75,10 @@ def _probability(number: float) -> str:
 
 
 def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTest:
-    """Test a residual against white noise.
+    """Test a residual, measured minus fitted in the order of time, against white noise.
 
-    Parameters
-    ----------
-    residual : ndarray of float, shape (sample,)
-        Measured minus fitted, in the order of time.
-    excursion : float
-        Largest excursion of the motion from its equilibrium, in the same unit.
-    turn : float
-        Phase of the oscillation per sample, rad: the test looks over two periods of it.
+    The excursion is the largest of the motion from its equilibrium, in the same unit. The test looks over two periods
+    of the oscillation, whose phase per sample is `turn`, rad.
     """
     from scipy.stats import chi2
 
@@ -163,25 +149,15 @@ def effective_samples(residual: Floats, turn: float) -> float:
 def coloured_covariance(jacobian: Floats, residual: Floats, correlation: int) -> tuple[Floats, float]:
     """Return the covariance of the parameters of a fit whose residuals may be correlated, and its freedom.
 
-    The sandwich `(J'J)^-1 S (J'J)^-1` with `S = sum_l (1 - |l| / (L + 1)) sum_i s_i s_(i+l)'`, `s_i = J_i r_i`
-    (Newey and West). Correlation among neighbours counts at the frequency at which the parameter acts: an
-    amplitude is as uncertain as the residual is strong near the frequency of the oscillation. Where this is
-    less than the formula for white residuals gives, the white one is kept, parameter by parameter: a fit
-    removes from its residual what resembles its parameters, and the sandwich alone would be too sure.
+    The sandwich `(J'J)^-1 S (J'J)^-1` with `S = sum_l (1 - |l| / (L + 1)) sum_i s_i s_(i+l)'`, `s_i = J_i r_i` (Newey
+    and West). Correlation among neighbours counts at the frequency at which the parameter acts: an amplitude is as
+    uncertain as the residual is strong near the frequency of the oscillation. Where this is less than the formula for
+    white residuals gives, the white one is kept, parameter by parameter: a fit removes from its residual what resembles
+    its parameters, and the sandwich alone would be too sure.
 
-    Parameters
-    ----------
-    jacobian : ndarray of float, shape (sample, parameter)
-    residual : ndarray of float, shape (sample,)
-    correlation : int
-        Samples over which the residual may be correlated, at least: some periods of the oscillation.
-        More is taken where the scores are correlated over longer.
-
-    Returns
-    -------
-    covariance : ndarray of float, shape (parameter, parameter)
-    freedom : float
-        Degrees of freedom of a variance that was summed over L lags: 3 n / (2 (L + 1)), for Student's t.
+    The Jacobian has shape (sample, parameter). The correlation is counted in samples, some periods of the oscillation
+    at least; more is taken where the scores are correlated over longer. The freedom, of a variance that was summed over
+    L lags, is 3 n / (2 (L + 1)), for Student's t.
     """
     samples, parameters = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)

@@ -87,32 +87,23 @@ class Resonance:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A frequency response to fit: complex where the phase is known, else real magnitudes.
-
-    Attributes
-    ----------
-    angular_frequency : ndarray of float, shape (line,)
-        rad/s.
-    response : ndarray of complex or float, shape (line,)
-    error : ndarray of float, shape (line,)
-        Standard error of each real part; zeros where not known.
-    form, unit : str
-        One of `FORMS`; CF unit of C.
-    leakage : Leakage
-        What the lines show of the response.
-    estimator : {"h1", "h2"}
-    common : float
-        Lines that are worth one.
-    """
+    """A frequency response to fit: complex where the phase is known, else real magnitudes; arrays of shape (line,)."""
 
     angular_frequency: Floats
+    """rad/s."""
     response: Floats | Complexes
     error: Floats
+    """Standard error of each real part; zeros where not known."""
     form: str = "displacement"
+    """One of `FORMS`."""
     unit: str = "1"
+    """CF unit of C."""
     leakage: Leakage = NO_LEAKAGE
+    """What the lines show of the response."""
     estimator: str = "h1"
+    """`h1` or `h2`."""
     common: float = 1.0
+    """Lines that are worth one."""
 
     @property
     def complex(self) -> bool:
@@ -280,13 +271,7 @@ def _model(curve: Curve, p: Floats) -> Floats | Complexes:
 
 
 def _solved(curve: Curve, start: Floats) -> OptimizeResult:
-    """Return the least-squares fit, its parameters within the band.
-
-    Raises
-    ------
-    EstimationError
-        The fit leaves the band.
-    """
+    """Return the least-squares fit, its parameters within the band; EstimationError where the fit leaves it."""
     from scipy.optimize import least_squares
 
     omega = curve.angular_frequency
@@ -352,13 +337,7 @@ def _larger(one: Floats, other: Floats) -> Floats:
 
 
 def _start(curve: Curve) -> Floats:
-    """Return the parameters that the peak and its width suggest.
-
-    Raises
-    ------
-    EstimationError
-        All lines have one frequency.
-    """
+    """Return the parameters that the peak and its width suggest; EstimationError for lines of one frequency."""
     omega = curve.angular_frequency
     # a sweep up and down has each frequency twice
     spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)

@@ -23,22 +23,11 @@ _SPIKES_IN_WINDOW = 20
 
 
 def running_median(values: Floats, window: int, used: NDArray[np.bool_] | None = None) -> Floats:
-    """Return medians of windows that overlap by half, joined by straight lines.
+    """Return medians, shape (sample,), of windows that overlap by half, joined by straight lines.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-    window : int
-        Samples in a window; a window as long as the signal gives one constant.
-    used : ndarray of bool, shape (sample,), optional
-        Samples to take; a window with less than a quarter of them is bridged.
+    The window is in samples; one as long as the signal gives one constant. A window with less than a quarter of its
+    samples `used` is bridged.
 
-    Returns
-    -------
-    ndarray of float, shape (sample,)
-
-    Examples
-    --------
     >>> signal = np.full(100, 3.0)
     >>> signal[40:44] = 50.0
     >>> float(np.ptp(running_median(signal, 40)))
@@ -71,16 +60,8 @@ def running_median(values: Floats, window: int, used: NDArray[np.bool_] | None =
 def drift_window(values: Floats, longest_spike: int, used: NDArray[np.bool_]) -> int:
     """Return the longest window (samples) that follows the drift.
 
-    From the whole signal down, a window is halved while that lowers the noise of what is left by more than
-    5 %, and never below 20 times the longest spike.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-    longest_spike : int
-        Samples.
-    used : ndarray of bool, shape (sample,)
-        Samples outside spikes.
+    From the whole signal down, a window is halved while that lowers the noise of what is left by more than 5 %, and
+    never below 20 times the longest spike (samples). `used` are the samples outside spikes.
     """
     shortest = max(2 * _FEWEST_SAMPLES, _SPIKES_IN_WINDOW * longest_spike)
     window = len(values)

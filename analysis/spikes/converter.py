@@ -29,15 +29,8 @@ _FEWEST_LEVELS, _STAYS = 4, 4
 
 
 def converter_step(values: Floats) -> float:
-    """Return the step of the grid on which all values lie; 0 where there is none, or where noise hides it.
+    """Return the step of the grid of all values, calibrated or not; 0 where there is none, or where noise hides it.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-        As they were converted, calibrated or not.
-
-    Examples
-    --------
     >>> counts = np.array([3, 4, 4, 3, 5, 4, 9, 4])
     >>> round(converter_step(0.25 * counts + 0.1), 12)
     0.25

@@ -36,27 +36,18 @@ _REFINEMENTS = 5
 
 @dataclass(frozen=True, slots=True)
 class PeriodicPart:
-    """The periodic part of a signal, or why there is none.
-
-    Attributes
-    ----------
-    period : float
-        Samples; 0 where nothing repeats.
-    periodic : ndarray of float, shape (sample,)
-        The periodic part, about the signal's own mean level; zeros where there is none.
-    count : int
-        Cycles in the signal.
-    left : float
-        Noise without the periodic part, as a part of the noise with it.
-    reason : str
-        Why it is an excitation or why not, in words.
-    """
+    """The periodic part of a signal, or why there is none."""
 
     period: float
+    """Samples; 0 where nothing repeats."""
     periodic: Floats
+    """About the signal's own mean level, shape (sample,); zeros where there is none."""
     count: int
+    """Cycles in the signal."""
     left: float
+    """Noise without the periodic part, as a part of the noise with it."""
     reason: str
+    """Why it is an excitation or why not, in words."""
 
     @property
     def found(self) -> bool:
@@ -67,17 +58,11 @@ class PeriodicPart:
 def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
     """Look for a periodic excitation.
 
-    It is one if (a) at least ten cycles are there; (b) the median over its cycles, taken off, leaves less than
-    half of the signal's median magnitude: a train of spikes rests most of the time, so that its median magnitude is
-    noise already, and noise has no cycle; (c) its amplitude in the first and the last third of the cycles agrees
-    within 10 %: a ring decays.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-        Evenly sampled, no gaps.
-    period : float, optional
-        Samples; given, it is refined no further and nothing is tested.
+    It is one if (a) at least ten cycles are there; (b) the median over its cycles, taken off, leaves less than half of
+    the signal's median magnitude: a train of spikes rests most of the time, so that its median magnitude is noise
+    already, and noise has no cycle; (c) its amplitude in the first and the last third of the cycles agrees within 10 %:
+    a ring decays. Values are evenly sampled, without gaps. A given period (samples) is refined no further, and nothing
+    is tested.
     """
     level = values - running_median(values, max(len(values) // 4, 1))
     if period is not None:
@@ -145,18 +130,10 @@ def _fundamental(values: Floats, line: float) -> PeriodicPart | None:
 def refined_period(values: Floats, period: float) -> float:
     """Return the period of a line from its phase, cycle by cycle.
 
-    The phase of the line against a clock of the trial period grows by a constant from cycle to cycle where the
-    trial is off; the median of the slopes between all pairs of cycles (Theil 1950, Sen 1968) corrects it and takes
-    no notice of a shock.
+    The phase of the line against a clock of the trial period grows by a constant from cycle to cycle where the trial is
+    off; the median of the slopes between all pairs of cycles (Theil 1950, Sen 1968) corrects it and takes no notice of
+    a shock. The given period, in samples, is right to a fraction of a cycle over the signal.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-    period : float
-        Samples, right to a fraction of a cycle over the signal.
-
-    Examples
-    --------
     >>> samples = np.arange(5000)
     >>> round(refined_period(np.sin(2 * np.pi * samples / 123.4567), 124.0), 3)
     123.457
@@ -225,21 +202,9 @@ def cycle_scores(residual: Floats, period: float, window: int) -> Floats:
     """Return how far the short-window RMS is above what it is at the same phase in the other cycles.
 
     A smooth shock is small against the signal and no larger than the irregular moments of every cycle; it is large
-    against what the same phase of other cycles shows. The score is (rms - median) / (1.4826 MAD), median and MAD
-    over the cycles at that phase, both smoothed over the window.
-
-    Parameters
-    ----------
-    residual : ndarray of float, shape (sample,)
-        The signal without its periodic part.
-    period : float
-        Samples.
-    window : int
-        Samples of the RMS.
-
-    Returns
-    -------
-    ndarray of float, shape (sample,)
+    against what the same phase of other cycles shows. The score is (rms - median) / (1.4826 MAD), median and MAD over
+    the cycles at that phase, both smoothed over the window. The residual is the signal without its periodic part;
+    period and window are in samples.
     """
     rms = np.sqrt(_moving_mean(residual**2, window))
     cycles = fold(rms, period)

@@ -24,26 +24,19 @@ _BEATS, _BEATS_BELOW = 0.5, 0.1
 
 @dataclass(frozen=True, slots=True)
 class Excursions:
-    """Stretches in which a statistic passed a threshold, in order.
-
-    Attributes
-    ----------
-    first, last : ndarray of int, shape (excursion,)
-        First and last sample above the lower threshold.
-    up, down : ndarray of float, shape (excursion,)
-        First upward and last downward crossing of the threshold, s, linear between samples.
-    peak : ndarray of float, shape (excursion,)
-        Largest value of the statistic.
-    samples : ndarray of int, shape (excursion,)
-        Samples above the threshold.
-    """
+    """Stretches in which a statistic passed a threshold, in order; each has shape (excursion,)."""
 
     first: Indices
     last: Indices
+    """`first` and `last` sample above the lower threshold."""
     up: Floats
+    """First upward crossing of the threshold, s, linear between samples."""
     down: Floats
+    """Last downward crossing, likewise."""
     peak: Floats
+    """Largest value of the statistic."""
     samples: Indices
+    """Samples above the threshold."""
 
     def __len__(self) -> int:
         """Return the number of excursions."""
@@ -63,18 +56,8 @@ def find_excursions(time: Floats, statistic: Floats, threshold: float, hysteresi
     """Return the excursions past a threshold.
 
     An excursion begins where the statistic rises past `threshold` and is over only where it has fallen below
-    `hysteresis * threshold`, so that noise on its flank does not split it. A change of sign ends it too.
-
-    Parameters
-    ----------
-    time : ndarray of float, shape (sample,)
-        s.
-    statistic : ndarray of float, shape (sample,)
-        Signed; its magnitude is compared.
-    threshold : float
-        In units of the statistic.
-    hysteresis : float
-        Lower threshold as a part of the threshold, 0 to 1.
+    `hysteresis * threshold`, so that noise on its flank does not split it. A change of sign ends it too. The statistic
+    is signed, its magnitude is compared; time is in s.
     """
     magnitude = np.abs(statistic)
     low = (magnitude > hysteresis * threshold) * np.where(statistic < 0.0, -1, 1)
@@ -107,8 +90,6 @@ def _crossings(
 def crossing(time: Floats, values: Floats, before: int, after: int, level: float) -> float:
     """Return where the line between two neighbouring samples is at a level, s; an end of the record is its own.
 
-    Examples
-    --------
     >>> crossing(np.array([0.0, 1.0]), np.array([0.0, 4.0]), 0, 1, 1.0)
     0.25
     """
@@ -126,17 +107,10 @@ def group_excursions(
 ) -> tuple[list[Group], int]:
     """Return each spike with its ringing, and how many excursions have too few samples to be one.
 
-    An excursion joins the group before it if it begins within `merge` of the end of the last one in it. A group
-    with fewer than `minimum_samples` above the threshold, over all its half cycles, is no spike (thesis 5.3: four).
-
-    Parameters
-    ----------
-    found : Excursions
-    time : ndarray of float, shape (sample,)
-        s.
-    merge : float or None
-        s; None: ten lengths of the largest excursion in the group for those less than half as high, two for higher
-        ones, and more for small ones after long ringing.
+    An excursion joins the group before it if it begins within `merge` (s) of the end of the last one in it. None: ten
+    lengths of the largest excursion in the group for those less than half as high, two for higher ones, and more for
+    small ones after long ringing. A group with fewer than `minimum_samples` above the threshold, over all its half
+    cycles, is no spike (thesis 5.3: four).
     """
     groups: list[Group] = []
     begins, ends = time[found.first], time[found.last]

@@ -63,28 +63,19 @@ _MOST_BEYOND = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """The noise of a record and the threshold that follows from it.
-
-    Attributes
-    ----------
-    sigma : float
-        Robust standard deviation of the noise, in units of the signal.
-    shape : float
-        Shape of the tail, with one standard error added where it is positive.
-    threshold : float
-        What noise passes `false_alarms` times in a record like this.
-    """
+    """The noise of a record and the threshold that follows from it."""
 
     sigma: float
+    """Robust standard deviation of the noise, in units of the signal."""
     shape: float
+    """Shape of the tail, with one standard error added where it is positive."""
     threshold: float
+    """What noise passes `false_alarms` times in a record like this."""
 
 
 def half_wave_peaks(values: Floats) -> Floats:
     """Return the largest magnitude in each stretch of one sign, the first and last stretch included.
 
-    Examples
-    --------
     >>> half_wave_peaks(np.array([1.0, 3.0, -2.0, -1.0, 4.0]))
     array([3., 2., 4.])
     """
@@ -121,13 +112,7 @@ def at_rest(values: Floats) -> NDArray[np.bool_]:
 
 
 def quiet(values: Floats) -> NDArray[np.bool_]:
-    """Return which samples lie in stretches that do not ring.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-        The signal without its baseline.
-    """
+    """Return which samples lie in stretches that do not ring; the values are without their baseline."""
     long = max(_SHORTEST_STRETCH, len(values) // _STRETCHES)
     short = max(_SHORTEST_STRETCH, _HALF_WAVES * len(values) // max(1, half_wave_peaks(values).size))
     still = _still(values, long, _RINGS)
@@ -150,14 +135,9 @@ def _still(values: Floats, stretch: int, ratio: float) -> NDArray[np.bool_]:
 
 
 def outside_excursions(values: Floats) -> NDArray[np.bool_]:
-    """Return which samples are noise, and no part of an excursion that is as long as a spike.
+    """Return which samples, without their baseline, are noise, and no part of an excursion that is as long as a spike.
 
     Excursions of fewer samples are left: they are the tail of the noise.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-        The signal without its baseline.
     """
     outside = np.ones(len(values), dtype=bool)
     for _ in range(_MOST_LOOKS):
@@ -197,14 +177,7 @@ def _long_excursions(values: Floats, sigma: float) -> NDArray[np.bool_]:
 def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Tail:
     """Return the threshold that noise passes `false_alarms` times a record, from the record itself.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (sample,)
-        The signal without its baseline.
-    false_alarms : float
-        Expected number of noise peaks above the threshold in the whole record.
-    polarity : int
-        1 or -1 to look at peaks of one sign only, 0 for both.
+    The values are without their baseline; a polarity of 1 or -1 looks at peaks of one sign only, 0 at both.
     """
     from scipy.special import ndtri
 

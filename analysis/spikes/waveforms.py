@@ -24,27 +24,18 @@ _SMALLEST_LEVEL = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Waveform:
-    """A curve of unit peak and unit length, and its integrals.
-
-    Attributes
-    ----------
-    value : callable
-        Of the time from its middle in units of its length.
-    slope : callable
-        Its derivative.
-    half_width : callable
-        Half of its width at a level (part of the peak), in units of its length.
-    part_above : callable
-        Part of its impulse between its two crossings of a level, the part below the level included.
-    impulse : float
-        Whole impulse over peak times length.
-    """
+    """A curve of unit peak and unit length, and its integrals."""
 
     value: Callable[[Floats], Floats]
+    """Of the time from its middle in units of its length."""
     slope: Callable[[Floats], Floats]
+    """Its derivative."""
     half_width: Callable[[Floats], Floats]
+    """Half of its width at a level (part of the peak), in units of its length."""
     part_above: Callable[[Floats], Floats]
+    """Part of its impulse between its two crossings of a level, the part below the level included."""
     impulse: float
+    """Whole impulse over peak times length."""
 
 
 def _inside(time: Floats) -> Floats:
@@ -91,37 +82,27 @@ WAVEFORMS = {
 
 @dataclass(frozen=True, slots=True)
 class WaveformFit:
-    """One curve fitted to every pulse.
+    """One curve fitted to every pulse; each has shape (spike,).
 
-    Attributes
-    ----------
-    peak, middle, length : ndarray of float, shape (spike,)
-        SI unit, s, s; NaN for a pulse of fewer samples than its three unknowns ask for.
-    goodness : ndarray of float, shape (spike,)
-        1 - (squares of the residual) / (squares about the mean) within the pulse.
-    squares : ndarray of float, shape (spike,)
-        Mean square of the residual, SI unit squared.
+    A pulse of fewer samples than its three unknowns ask for has NaN.
     """
 
     peak: Floats
+    """SI unit."""
     middle: Floats
     length: Floats
+    """Middle and length, s."""
     goodness: Floats
+    """1 - (squares of the residual) / (squares about the mean) within the pulse."""
     squares: Floats
+    """Mean square of the residual, SI unit squared."""
 
 
 def fit_waveforms(pulses: list[tuple[Floats, Floats]], levels: Floats) -> dict[str, WaveformFit]:
     """Fit each curve to each pulse by least squares.
 
     All pulses are fitted at once: each is read at 33 instants, and Gauss and Newton's step is one solution of 3 by 3
-    systems.
-
-    Parameters
-    ----------
-    pulses : list of (ndarray, ndarray)
-        Instants (s) and values of each pulse, from its crossing of the level to the next one.
-    levels : ndarray of float, shape (spike,)
-        The level as a part of the peak.
+    systems. A pulse has instants (s) and values, from its crossing of the level, a part of the peak, to the next one.
     """
     if not pulses:
         empty = np.zeros(0)
