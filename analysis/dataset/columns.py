@@ -185,19 +185,8 @@ OF_ALL_PERIODS = {
 def of_all_periods(periods: Floats) -> Floats:
     """Return what each run recorded in all its periods together.
 
-    Parameters
-    ----------
-    periods : ndarray of float, shape (run, period, 5)
-        Columns `PERIOD_COLUMNS`; a run that recorded fewer periods than the others ends in NaN.
-
-    Returns
-    -------
-    ndarray of float, shape (run, 1, 5)
-        The same columns: largest, smallest, those of the last period (2), mean; NaN of a run without any period.
-
-    >>> one = [[[2.0, -1.0, 0.1, 0.0, 1.0], [3.0, 0.0, 0.2, 0.5, 2.0], [np.nan] * 5]]
-    >>> of_all_periods(np.array(one)).tolist()
-    [[[3.0, -1.0, 0.2, 0.5, 1.5]]]
+    The columns are `PERIOD_COLUMNS`, shape (run, period, 5), then (run, 1, 5): largest, smallest, those of the last
+    period (2), mean. A run that recorded fewer periods than the others ends in NaN; one without any has NaN alone.
     """
     result = np.full((len(periods), 1, len(PERIOD_COLUMNS)), np.nan)
     # each recorded period counts its impacts, whatever else is recorded

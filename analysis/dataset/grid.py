@@ -72,14 +72,7 @@ class Flat(Named, Protocol):
 
 
 def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
-    """Return runs on the dimensions of their sweep, with the ragged arrays beside them.
-
-    Parameters
-    ----------
-    flat : xarray.Dataset or Read
-    lazily : bool
-        Whether a variable is laid out when it is first used.
-    """
+    """Return runs on the dimensions of their sweep, with the ragged arrays beside them; lazily: when first used."""
     labelled = _with_labels(flat)
     dims, axes, scalars, run_id = _grid(labelled)
     swept, constants = swept_names(labelled), constant_names(labelled)

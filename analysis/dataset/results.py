@@ -114,13 +114,7 @@ class ResultTable:
         return found.assign_attrs(results_kind=self.kind)
 
     def rule_of(self, name: str) -> VariableRule:
-        """Return what the table says of a variable.
-
-        Raises
-        ------
-        DatasetError
-            There is no such variable.
-        """
+        """Return what the table says of a variable; an unknown one raises DatasetError."""
         if name in self.rules:
             return self.rules[name]
         family, number = re.sub(r"\d+$", "#", name), name[len(name.rstrip("0123456789")) :]

@@ -420,13 +420,7 @@ def unit_in(system: UnitSystem, unit: str) -> str:
 def quantity_unit(name: str, system: UnitSystem) -> str:
     """Return the unit of a sampled variable, known by the end of its name.
 
-    Raises
-    ------
-    DatasetError
-        If no known quantity ends the name; the writer must then be told the unit.
-
-    >>> quantity_unit("contact_displacement", "SI"), quantity_unit("velocity_2", "SI")
-    ('m', 'm s-1')
+    An unknown quantity raises DatasetError; the writer must then be told the unit.
     """
     unit = known_unit(name)
     if unit is None:
@@ -513,20 +507,7 @@ def _is_constant(coordinate: xr.Variable) -> bool:
 
 
 def flat_order(first_rows: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the row numbers of ragged blocks in the order given.
-
-    Parameters
-    ----------
-    first_rows, counts : ndarray of int, shape (run,)
-        First row and number of rows of each block.
-
-    Returns
-    -------
-    ndarray of int, shape (sum of counts,)
-
-    >>> flat_order(np.array([3, 0]), np.array([2, 3])).tolist()
-    [3, 4, 0, 1, 2]
-    """
+    """Return the row numbers, shape (sum of counts,), of ragged blocks in the order given."""
     ends = np.cumsum(counts)
     return np.repeat(first_rows - (ends - counts), counts) + np.arange(ends[-1] if ends.size else 0)
 

@@ -15,22 +15,14 @@ from vibroimpact.analysis.dataset.schema import constant_names, swept_names
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """One variable in a file.
-
-    Attributes
-    ----------
-    name : str
-    variable : xarray.Variable
-    linked : str
-        Names of its coordinates: an attribute of the file; empty where it has none.
-    may_miss : bool
-        Whether NaN marks values that are missing.
-    """
+    """One variable in a file."""
 
     name: str
     variable: xr.Variable
     linked: str
+    """Names of its coordinates: an attribute of the file; empty where it has none."""
     may_miss: bool
+    """Whether NaN marks values that are missing."""
 
 
 def stored_variables(dataset: xr.Dataset) -> Iterator[Stored]:
@@ -49,20 +41,12 @@ def stored_variables(dataset: xr.Dataset) -> Iterator[Stored]:
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """What a file gives back, before it is a dataset of xarray: making one costs more than all else.
-
-    Attributes
-    ----------
-    variables : dict of str to xarray.Variable
-        In the order of the file, the alphabet.
-    coords : tuple of str
-        Names of those that are coordinates.
-    attrs : dict
-        Attributes of the file.
-    """
+    """What a file gives back, before it is a dataset of xarray: making one costs more than all else."""
 
     variables: dict[str, xr.Variable]
+    """In the order of the file, the alphabet."""
     coords: tuple[str, ...]
+    """Names of those that are coordinates."""
     attrs: dict[Any, Any]
 
     @property

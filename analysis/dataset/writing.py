@@ -164,23 +164,11 @@ def build_dataset(
 def with_constants(
     dataset: xr.Dataset, constants: Mapping[str, float], *, unit_of: Mapping[str, str] | None = None
 ) -> xr.Dataset:
-    """Return a dataset with the numbers of its scene that are the same for all runs, as scalar coordinates.
+    """Return a one-dimensional dataset with the numbers of its scene that all runs share, as scalar coordinates.
 
-    They keep the datasets of two scenes apart when these are joined: `xr.concat([...], dim="restitution")`.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        One-dimensional, as `build_dataset` and `merge_datasets` make it.
-    constants : mapping of str to float
-        By their names in the file; the dataset has nothing of such a name.
-    unit_of : mapping of str to str, optional
-        Their SI units; those of sampled quantities may be left out.
-
-    Raises
-    ------
-    DatasetError
-        If the unit of one is not known.
+    They keep the datasets of two scenes apart when these are joined: `xr.concat([...], dim="restitution")`. Their names
+    in the file are new there; units are SI, and those of sampled quantities may be left out. An unknown unit raises
+    DatasetError.
     """
     described = described_constants(constants, dataset.attrs["units_system"], unit_of)
     return dataset.assign_coords(wrapped(described))

@@ -25,31 +25,21 @@ WHOLE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """What the intervals say about the motion.
-
-    Attributes
-    ----------
-    impacts : int
-        p, the smallest that the intervals allow; 0: they do not repeat.
-    duration : float
-        Of one cycle, s: median sum of p successive intervals; NaN without one.
-    periods : int
-        q; 0: not known.
-    words : str
-        The verdict, and what it leaves open.
-    """
+    """What the intervals say about the motion."""
 
     impacts: int
+    """p, the smallest that the intervals allow; 0: they do not repeat."""
     duration: float
+    """Of one cycle, s: median sum of p successive intervals; NaN without one."""
     periods: int
+    """q; 0: not known."""
     words: str
+    """The verdict, and what it leaves open."""
 
 
 def read_cycle(train: IntervalTrain, forcing_period: float | None) -> Cycle:
     """Return the motion P(p,q) that the intervals show; without a forcing period (s) q stays unknown.
 
-    Examples
-    --------
     >>> from vibroimpact.analysis.intervals import interval_train
     >>> train = interval_train(np.cumsum(np.tile([0.4, 1.6], 20)))
     >>> cycle = read_cycle(train, 1.0)

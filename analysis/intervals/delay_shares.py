@@ -20,8 +20,6 @@ CELLS = ("(I, I)", "(I, 2I) or (2I, I)", "x + y = I", "x = I or y = I", "inside 
 def lattice_share(missed: float, spurious: float, i: int, j: int) -> float:
     """Return the share of the delay point (iI, jI), for probabilities of missed and spurious spikes.
 
-    Examples
-    --------
     >>> [round(lattice_share(0.1, 0.0, 1, j), 6) for j in (1, 2, 3)]
     [0.81, 0.081, 0.0081]
     """
@@ -35,8 +33,6 @@ def expected_shares(missed: float, spurious: float) -> Floats:
 
     The last three are those of single true intervals; with both missed and spurious spikes some points lie elsewhere.
 
-    Examples
-    --------
     >>> expected_shares(0.0, 0.04).round(6).tolist()
     [0.886154, 0.0, 0.038462, 0.073846, 0.001538]
     """

@@ -27,27 +27,20 @@ REACH = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Density:
-    """Density of the intervals, 1/s.
-
-    Attributes
-    ----------
-    at, kernel : ndarray of float, shape (point,)
-        Intervals (s) and the Gaussian kernel estimate there.
-    bandwidth : float
-        Standard deviation of the kernel, s.
-    edges : ndarray of float, shape (bin + 1,)
-        s.
-    histogram : ndarray of float, shape (bin,)
-    peaks : ndarray of float, shape (peak,)
-        Intervals at which the kernel estimate has a distinct maximum, s, ascending.
-    """
+    """Density of the intervals, 1/s."""
 
     at: Floats
+    """Intervals (s), shape (point,)."""
     kernel: Floats
+    """The Gaussian kernel estimate there, shape (point,)."""
     bandwidth: float
+    """Standard deviation of the kernel, s."""
     edges: Floats
+    """s, shape (bin + 1,)."""
     histogram: Floats
+    """Shape (bin,)."""
     peaks: Floats
+    """Intervals at which the kernel estimate has a distinct maximum, s, ascending."""
 
     @property
     def bin_width(self) -> float:
@@ -62,8 +55,6 @@ def interval_density(intervals: Floats, *, resolution: float = 0.0) -> Density:
     far apart are not smeared into one; bins are as wide as one bandwidth, and whole multiples of the grid of the
     instants. Intervals and grid (`resolution`) are in s; no width is smaller than the grid.
 
-    Examples
-    --------
     >>> density = interval_density(np.tile([0.2, 0.8], 50))
     >>> [round(float(peak), 2) for peak in density.peaks]
     [0.2, 0.8]

@@ -123,8 +123,6 @@ def verdict(slopes: Floats, surrogate: Floats) -> str:
     Embeddings without a slope on either side are left out and named: on a coarse grid C of m = 1 may be above the
     window at every radius, and in a short train C of the largest m below it.
 
-    Examples
-    --------
     >>> verdict(np.array([0.9, 1.2, 1.2, 1.2]), np.array([0.9, 1.8, 2.7, 3.6]))
     'saturation at 1.20 from m = 2 on, where the surrogate goes on to 3.60: low-dimensional'
     """

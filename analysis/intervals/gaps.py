@@ -25,27 +25,18 @@ FEWEST_INTERVALS = 10
 
 @dataclass(frozen=True, slots=True)
 class MissedBeats:
-    """Intervals in which beats are missing.
-
-    Attributes
-    ----------
-    ratio : ndarray of float, shape (interval,)
-        Each interval over its local median; NaN where masked.
-    spread : float
-        Robust coefficient of variation about the local median.
-    place : ndarray of int, shape (gap,)
-        Index of the interval among all intervals of the train.
-    missing : ndarray of int, shape (gap,)
-        Beats that each would have had: its length in local medians, rounded, less one.
-    reason : str
-        Why none were looked for; empty when they were.
-    """
+    """Intervals in which beats are missing."""
 
     ratio: Floats
+    """Each interval over its local median, shape (interval,); NaN where masked."""
     spread: float = float("nan")
+    """Robust coefficient of variation about the local median."""
     place: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    """Index of the interval among all intervals of the train, shape (gap,)."""
     missing: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    """Beats that each would have had, shape (gap,): its length in local medians, rounded, less one."""
     reason: str = ""
+    """Why none were looked for; empty when they were."""
 
 
 def find_gaps(train: IntervalTrain) -> MissedBeats:
@@ -54,8 +45,6 @@ def find_gaps(train: IntervalTrain) -> MissedBeats:
     Valid where intervals scatter by less than about a fifth about their local median; otherwise one beat and two
     overlap, and none are looked for.
 
-    Examples
-    --------
     >>> from vibroimpact.analysis.intervals import interval_train
     >>> beats = np.delete(np.arange(40.0), [7, 20, 21])
     >>> found = find_gaps(interval_train(beats))

@@ -41,43 +41,35 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """What the lattice of a period-1 train says; nothing but a reason where there is none.
-
-    Attributes
-    ----------
-    interval : float
-        I, s.
-    jitter : float
-        Standard deviation of true spikes about their places, s.
-    missed, spurious : Share
-        p: a true spike is missed; s: an interval of the true motion has a spurious spike.
-    places, counted_missed, counted_spurious : int
-        Places of the lattice, those without an event, and events between them.
-    on_lattice : ndarray of bool, shape (event,)
-    reason : str
-        Why there is no lattice; empty when there is.
-    """
+    """What the lattice of a period-1 train says; nothing but a reason where there is none."""
 
     interval: float = float("nan")
+    """I, s."""
     jitter: float = float("nan")
+    """Standard deviation of true spikes about their places, s."""
     missed: Share = Share()
+    """p: a true spike is missed."""
     spurious: Share = Share()
+    """s: an interval of the true motion has a spurious spike."""
     places: int = 0
+    """Places of the lattice."""
     counted_missed: int = 0
+    """Places without an event."""
     counted_spurious: int = 0
+    """Events between places."""
     on_lattice: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
+    """Shape (event,)."""
     reason: str = ""
+    """Why there is no lattice; empty when there is."""
 
 
 def interval_lattice(train: IntervalTrain) -> Lattice:
     """Return missed and spurious spikes of a motion with one spike per period.
 
     Valid where misses are independent of each other, spurious spikes come at any phase and at most one in an interval,
-    and true spikes keep the phase of a clock (a forcing) that drifts slowly or not at all. Spurious spikes that fall
-    on the lattice cannot be seen; their number is made up for. The most frequent interval is the first guess of I.
+    and true spikes keep the phase of a clock (a forcing) that drifts slowly or not at all. Spurious spikes that fall on
+    the lattice cannot be seen; their number is made up for. The most frequent interval is the first guess of I.
 
-    Examples
-    --------
     >>> from vibroimpact.analysis.intervals import interval_train
     >>> times = np.delete(np.arange(200.0), [10, 50, 51, 120])
     >>> lattice = interval_lattice(interval_train(np.sort(np.append(times, [30.4, 77.7]))))

@@ -24,25 +24,17 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class FanoFactor:
-    """Variance (ddof 1) over mean of the counts in bins.
-
-    Attributes
-    ----------
-    width : float
-        Of the bins, s.
-    value : float
-        With the first bin at the start of the window; NaN, as the others, where there are fewer than 10 bins.
-    standard_error : float
-        sqrt(2 / (bins - 1)) of the value: as if the counts were normal and independent.
-    lowest, highest : float
-        Over `OFFSETS` places of the first bin.
-    """
+    """Variance (ddof 1) over mean of the counts in bins."""
 
     width: float
+    """Of the bins, s."""
     value: float = float("nan")
+    """With the first bin at the start of the window; NaN, as the others, where there are fewer than 10 bins."""
     standard_error: float = float("nan")
+    """sqrt(2 / (bins - 1)) of the value: as if the counts were normal and independent."""
     lowest: float = float("nan")
     highest: float = float("nan")
+    """`lowest` and `highest` over `OFFSETS` places of the first bin."""
 
 
 def rate(train: IntervalTrain) -> tuple[float, float]:

@@ -20,22 +20,15 @@ _DEVIATIONS = 4.0
 
 @dataclass(frozen=True, slots=True)
 class ChannelChain:
-    """The measuring chain of a channel.
-
-    Attributes
-    ----------
-    skew : float
-        s after the time of the dataset; 0 of what is no channel.
-    low, high : float
-        V; a sample that is not between them is at the end of a range.
-    attrs : dict
-        What the dataset says: `channel`, the name in the scene, and numbers.
-    """
+    """The measuring chain of a channel."""
 
     skew: float = 0.0
+    """s after the time of the dataset; 0 of what is no channel."""
     low: float = -np.inf
     high: float = np.inf
+    """V; a sample that is not between `low` and `high` is at the end of a range."""
     attrs: Mapping[str, Any] = field(default_factory=dict)
+    """What the dataset says: `channel`, the name in the scene, and numbers."""
 
     def quality(self, values: Floats) -> NDArray[np.uint8]:
         """Return the quality of samples, see `Quality`."""
@@ -44,16 +37,9 @@ class ChannelChain:
 
 
 def chain_of(attributes: Mapping[Any, Any], runs: Any, row: int) -> ChannelChain:
-    """Return the measuring chain of a sampled variable.
+    """Return the measuring chain of a sampled variable, whose attributes are given, in the run of a row.
 
-    Parameters
-    ----------
-    attributes : mapping
-        Of the variable.
-    runs : xarray.Dataset
-        One-dimensional; it has the coordinates of swept numbers.
-    row : int
-        Of the run.
+    The runs are one-dimensional, and have the coordinates of swept numbers.
     """
     if "channel" not in attributes:
         return ChannelChain()

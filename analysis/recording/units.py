@@ -47,24 +47,16 @@ _FACTOR = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class MeasuredUnit:
-    """A unit of a channel.
-
-    Attributes
-    ----------
-    label : str
-        As the file or the user wrote it.
-    cf : str
-        As it is stored: an SI unit that CF (UDUNITS) reads, with a factor where it is not SI: `9.80665 m s-2`.
-    si : str
-        The SI unit, as CF writes it: `m s-2`.
-    factor : float
-        SI value of one such unit.
-    """
+    """A unit of a channel."""
 
     label: str
+    """As the file or the user wrote it."""
     cf: str
+    """As it is stored: an SI unit that CF (UDUNITS) reads, with a factor where it is not SI: `9.80665 m s-2`."""
     si: str
+    """The SI unit, as CF writes it: `m s-2`."""
     factor: float
+    """SI value of one such unit."""
 
 
 def unit_label(cf: str) -> str:
