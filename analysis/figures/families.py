@@ -20,49 +20,32 @@ ROOMS = ("motion", "sweep", "measured", "study", "orbits")
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A kind of figure of one family of data.
-
-    Attributes
-    ----------
-    draw : callable
-        Draws data, or raises a DatasetError where they do not hold what the figure shows.
-    fits : callable
-        Whether data hold what the figure shows.
-    takes : tuple of str
-        Options: `run`, `recording`, `window`, `over`, `segment`, `variable`.
-    """
+    """A kind of figure of one family of data."""
 
     draw: Callable[[Any, View], Figure]
+    """Draws data, or raises a DatasetError where they do not hold what the figure shows."""
     fits: Callable[[Any], bool] = lambda data: True
+    """Whether data hold what the figure shows."""
     takes: tuple[str, ...] = ()
+    """Options: `run`, `recording`, `window`, `over`, `segment`, `variable`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Data that are drawn alike.
-
-    Attributes
-    ----------
-    name : str
-        Of results: their attribute `results_kind`.
-    words : str
-        What messages call such data.
-    drawings : mapping of str to Drawing
-        By the kind of figure.
-    usual : str or callable
-        The kind of figure that says most, or returns it of data in a view; by default the first.
-    type : type, optional
-        Objects that are of this family, where it is none of results.
-    is_of_results : bool
-        Whether the attribute `results_kind` of a dataset names this family.
-    """
+    """Data that are drawn alike."""
 
     name: str
+    """Of results: their attribute `results_kind`."""
     words: str
+    """What messages call such data."""
     drawings: Mapping[str, Drawing]
+    """By the kind of figure."""
     usual: str | Callable[[Any, View], str] = ""
+    """The kind of figure that says most, or returns it of data in a view; by default the first."""
     type: type | None = None
+    """Objects that are of this family, where it is none of results."""
     is_of_results: bool = True
+    """Whether the attribute `results_kind` of a dataset names this family."""
 
     def usual_kind(self, data: Any, view: View) -> str:
         """Return the kind of figure that says most of data."""
@@ -79,13 +62,7 @@ FAMILIES: dict[str, Family] = {}
 
 
 def register(family: Family) -> None:
-    """Take a family up; a second one of its name is a mistake.
-
-    Raises
-    ------
-    ValueError
-        There is a family of this name.
-    """
+    """Take a family up; a second one of its name raises ValueError."""
     if family.name in FAMILIES:
         raise ValueError(f"figure: {family.name}: expected a family of another name, got one twice.")
     FAMILIES[family.name] = family

@@ -29,12 +29,8 @@ KINDS = tuple(dict.fromkeys(kind for family in FAMILIES.values() for kind in fam
 def draw_view(data: Data, kind: str, view: View) -> Figure:
     """Draw data as a kind of figure, or refuse it in one line that says what fits.
 
-    Raises
-    ------
-    DatasetError
-        The kind does not fit the data, or there is no such run or recording.
-    UsageError
-        The kind is unknown, or takes no such option.
+    DatasetError: the kind does not fit the data, or there is no such run or recording. UsageError: the kind is unknown,
+    or takes no such option.
     """
     if kind != "auto" and kind not in KINDS:
         raise UsageError(f"figure: kind: expected one of auto, {', '.join(KINDS)}, got {kind!r}.")

@@ -63,10 +63,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
 def laid_out(figure: Figure, title: str | None, width: float | None, height: float | None) -> Figure:
     """Return a figure with a title and a size (mm); None leaves what it has.
 
-    Raises
-    ------
-    UsageError
-        If its panels have no room, or the title has a formula that cannot be set.
+    Panels without room, or a title with a formula that cannot be set, raise UsageError.
     """
     if title is not None:
         figure.suptitle(title, fontsize=8, wrap=True)

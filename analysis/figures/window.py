@@ -65,10 +65,7 @@ class Window:
     def part(self, time: Floats, period: float | None = None) -> tuple[float, float]:
         """Return first and last instant to draw (s) of all there are, ascending, at a forcing period (s).
 
-        Raises
-        ------
-        UsageError
-            Nothing, or a single sample, lies in the window; or periods are asked for where there are none.
+        An empty window, one with a single sample, or periods where there are none raise UsageError.
         """
         first, last = self.whole(time)
         if self.periods is not None and period is None:

@@ -72,10 +72,7 @@ def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Windo
 def comparison_of(dataset: xr.Dataset, recording: str | None) -> tuple[str, str]:
     """Return the name of a comparison, and what to say of its recording; the first where none is named.
 
-    Raises
-    ------
-    DatasetError
-        There is none, or several have this name.
+    None, or several of this name, raise DatasetError.
     """
     names = _column(dataset, "comparison")
     if not names:

@@ -232,27 +232,11 @@ def amplitude_spectrum(
 ) -> tuple[Floats, Floats]:
     """Return the amplitude spectrum of the longest stretch without a gap, its mean taken off (Hann window).
 
-    Parameters
-    ----------
-    name : str
-        Of the signal, for errors.
-    time, values : ndarray of float, shape (sample,)
-        Evenly spaced instants, s; NaN where there is no value.
-    rate : float, optional
-        Angular frequency, rad/s, of which whole periods are taken.
+    Instants (s) are evenly spaced, NaN marks values that are not there; whole periods of `rate` (rad/s) are taken.
+    Angular frequency (rad/s) and amplitude have shape (sample // 2 + 1,); a harmonic motion of amplitude A whose
+    frequency is on the grid has the height A. Uneven samples, or fewer than 16 in a row, raise DatasetError with the
+    name.
 
-    Returns
-    -------
-    angular_frequency, amplitude : ndarray of float, shape (sample // 2 + 1,)
-        rad/s; a harmonic motion of amplitude A whose frequency is on the grid has the height A.
-
-    Raises
-    ------
-    DatasetError
-        The samples are uneven, or fewer than 16 follow each other.
-
-    Examples
-    --------
     >>> time = np.arange(1000) / 100.0
     >>> frequency, amplitude = amplitude_spectrum("x", time, 3.0 + 2.0 * np.cos(8.0 * np.pi * time))
     >>> place = int(amplitude.argmax())

@@ -20,17 +20,9 @@ _OPACITY, _FAINTEST = 2.0, 0.03
 
 
 def draw_turns(axis: Axes, displacement: Floats, velocity: Floats, **style: Any) -> None:
-    """Draw a motion in the phase plane, a long one as layers.
+    """Draw a motion, whose line has gaps at NaN, in the phase plane, a long one as layers.
 
     A single line does not darken where it crosses itself, so that a chaotic motion would be one filled shape.
-
-    Parameters
-    ----------
-    axis : Axes
-    displacement, velocity : ndarray, shape (sample,)
-        NaN where the line has a gap.
-    style
-        Of a line, with its `color` and `label`.
     """
     begins = turn_begins(velocity)
     if begins.size <= FEW_TURNS:
@@ -44,15 +36,7 @@ def draw_turns(axis: Axes, displacement: Floats, velocity: Floats, **style: Any)
 
 
 def draw_layers(axis: Axes, layers: Any, **style: Any) -> None:
-    """Draw lines as faint layers; what names them is as dark as any other line.
-
-    Parameters
-    ----------
-    axis : Axes
-    layers : sequence of ndarray, shape (point, 2)
-    style
-        Of a line, with its `color` and `label`.
-    """
+    """Draw lines, shape (point, 2) each, as faint layers; what names them is as dark as any other line."""
     words, colour = style.pop("label", None), style.pop("color")
     opacity = max(_FAINTEST, _OPACITY / np.sqrt(max(len(layers), 1)))
     lines = LineCollection(layers, colors=colour, linewidths=_THIN, alpha=min(1.0, opacity), **style)
@@ -65,8 +49,6 @@ def draw_layers(axis: Axes, layers: Any, **style: Any) -> None:
 def turn_begins(velocity: Floats) -> Any:
     """Return the samples at which a motion begins a turn: its velocity becomes positive.
 
-    Examples
-    --------
     >>> turn_begins(np.array([-1.0, 1.0, np.nan, -1.0, -1.0, 2.0])).tolist()
     [1, 5]
     """

@@ -53,19 +53,8 @@ _MARKS = {
 def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable: str | None = None) -> Figure:
     """Draw displacement range and impact velocity of orbits over their parameter: stable solid, unstable dashed.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Branches of orbits.
-    over : xarray.Dataset, optional
-        A sweep of the same parameter, drawn below.
-    variable : str, optional
-        Draw this instead: one of `diagrams.drawable_variables`.
-
-    Raises
-    ------
-    DatasetError
-        The sweep is one of something else, or the variable was not recorded.
+    A sweep of the same parameter is drawn below (`over`). A variable, of `diagrams.drawable_variables`, is drawn
+    instead. Another sweep, or a variable that was not recorded, raises DatasetError.
     """
     names = varied(dataset)
     if variable is not None:

@@ -21,17 +21,8 @@ _DOTS: dict[str, Any] = {"marker": ".", "linestyle": "none", "markersize": 1.6, 
 def draw_control(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure:
     """Draw impact velocities over the angular frequency, and what the amplitude was corrected by.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        What `control` returns.
-    over : xarray.Dataset, optional
-        A sweep of the same frequency, drawn below: what happens without control.
-
-    Raises
-    ------
-    DatasetError
-        The sweep is one of something else.
+    A sweep of the same frequency is drawn below (`over`): what happens without control. Another sweep raises
+    DatasetError.
     """
     frequency, velocity = dataset["angular_frequency"].values, dataset["impact_velocity"].values
     figure = canvas(100)

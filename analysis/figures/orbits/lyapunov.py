@@ -17,10 +17,7 @@ _COLOURS = {"up": "#56A5DC", "down": "#B5410B"}
 def draw_lyapunov(dataset: xr.Dataset) -> Figure:
     """Draw the largest exponent of each run over one or two swept parameters; of a single run all exponents.
 
-    Raises
-    ------
-    DatasetError
-        More parameters are swept, or the runs are no grid of them.
+    More swept parameters, or runs that are no grid of them, raise DatasetError.
     """
     names = [str(dim) for dim in dataset["reason"].dims if dim != "direction"]
     if not names and "direction" not in dataset["reason"].dims:

@@ -34,15 +34,7 @@ _MARKS = {"up": "^", "down": "v"}
 def draw_orbit_energies(dataset: xr.Dataset) -> Figure:
     """Draw what the modes of an orbit get and give, or their residual energies along a sweep; below, the restitution.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of kind `energies`.
-
-    Raises
-    ------
-    DatasetError
-        A variable is missing, or there is more than one swept key.
+    A missing variable, or more than one swept key, raises DatasetError.
     """
     missing = [name for name in (*_PARTS, "residual_energy", "contact_energy") if name not in dataset]
     if missing:

@@ -26,15 +26,7 @@ _NEEDED = ("quantity", "peak_frequency", "peak_height", "shifted_frequency", "na
 def draw_resonances(dataset: xr.Dataset) -> Figure:
     """Draw a panel for the whole body's displacement range, its impact velocity, and the kinetic energies of the modes.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of kind `resonances`.
-
-    Raises
-    ------
-    DatasetError
-        A variable is missing.
+    A missing variable raises DatasetError.
     """
     missing = [name for name in _NEEDED if name not in dataset.variables]
     if missing:

@@ -30,22 +30,8 @@ def draw_accuracy(dataset: xr.Dataset) -> Figure:
 
     The line of those that no other way beats is drawn behind them; what failed is a cross at the top, where its time
     went; another model of the same thing is hollow. A way that simulated a part of the time has a ring: its cost is
-    extrapolated, and its error is that of the part.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of kind `accuracy`, as `vibroimpact accuracy` writes it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One column (85 mm) wide.
-
-    Raises
-    ------
-    DatasetError
-        If a variable is missing.
+    extrapolated, and its error is that of the part. The figure is one column (85 mm) wide. A missing variable raises
+    DatasetError.
     """
     refuse_missing(missing_from(dataset, _NEEDED), "what `vibroimpact accuracy` writes")
     names = list(dict.fromkeys(str(name) for name in dataset["name"].values))

@@ -29,20 +29,7 @@ _CLASSES = ("orbit", "orbit_without")
 def draw_effects(dataset: xr.Dataset) -> Figure:
     """Draw a bar for the share of each effect, a point for each pair of runs, and what changes without it.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of kind `effects`, as `vibroimpact effects` writes it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One column (85 mm) wide.
-
-    Raises
-    ------
-    DatasetError
-        If a variable is missing, or there is no effect.
+    The figure is one column (85 mm) wide. A missing variable, or no effect, raises DatasetError.
     """
     missing = missing_from(dataset, _NEEDED) or ([] if dataset["share"].size else ["effect"])
     refuse_missing(missing, "what `vibroimpact effects` writes")

@@ -32,22 +32,9 @@ _SMALLEST = 1e-17
 
 
 def draw_hard_cases(dataset: xr.Dataset) -> Figure:
-    """Draw what was measured of each case over what makes it hard, and its bound.
+    """Draw what was measured of each case over what makes it hard, and its bound; three panels beside each other.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of kind `hard_cases`, as `vibroimpact hard-cases` writes it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A panel for each case, three beside each other.
-
-    Raises
-    ------
-    DatasetError
-        If a variable is missing, or there is no case.
+    A missing variable, or no case, raises DatasetError.
     """
     missing = missing_from(dataset, _NEEDED) or ([] if dataset["figure"].size else ["case"])
     refuse_missing(missing, "what `vibroimpact hard-cases` writes")

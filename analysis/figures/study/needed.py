@@ -15,23 +15,8 @@ def missing_from(dataset: xr.Dataset, needed: Iterable[str]) -> list[str]:
 
 
 def refuse_missing(missing: Sequence[str], expected: str, advice: str = "") -> None:
-    """Refuse a dataset in which something is missing.
+    """Raise DatasetError, with advice, if names are missing in a dataset of which a figure is drawn.
 
-    Parameters
-    ----------
-    missing : sequence of str
-        Names of what is not there; nothing is refused where it is empty.
-    expected : str
-        What a figure is drawn of, in words.
-    advice : str
-        A sentence on what to do.
-
-    Raises
-    ------
-    DatasetError
-
-    Examples
-    --------
     >>> refuse_missing(["cost", "error"], "what `vibroimpact accuracy` writes")
     Traceback (most recent call last):
         ...

@@ -20,17 +20,9 @@ _STYLES = {"up": "-", "down": "--"}
 
 
 def draw_sensitivity(dataset: xr.Dataset) -> Figure:
-    """Draw the indices of each quantity in a panel of its own.
+    """Draw the indices of each quantity in a panel of its own: bars, or with one more key the total indices along it.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of kind `sensitivity`: bars, or with one more key the total indices along it.
-
-    Raises
-    ------
-    DatasetError
-        A variable is missing, or there is more than one key beside the drawn ones.
+    A missing variable, or more than one such key, raises DatasetError.
     """
     missing = [name for name in _NEEDED if name not in dataset]
     if missing:

@@ -35,13 +35,7 @@ _MOST_NAMED = 8
 
 
 def draw_classes(dataset: xr.Dataset) -> Figure:
-    """Draw the class of each run over one or two swept parameters.
-
-    Raises
-    ------
-    DatasetError
-        The runs are not those of one or two parameters on a grid.
-    """
+    """Draw the class of each run over one or two swept parameters. No grid of them raises DatasetError."""
     names = in_order_of_the_scene(dataset, varied(dataset))
     if len(names) == 2 and not ({"run", "point"} & set(dataset["run_id"].dims)):
         return _draw_map(dataset, names[0], names[1])
@@ -53,12 +47,7 @@ def draw_classes(dataset: xr.Dataset) -> Figure:
 def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
     """Return the class of each run in words, in the shape of the runs; empty where there is no run.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        With the classes of runs, in any shape.
-    impacts_of : xarray.Dataset, optional
-        The dataset with their impacts; by default the same.
+    Their impacts are in the same dataset, or in `impacts_of`.
     """
 
     def named(kind: int, impacts: int, periods: int, stop: int) -> str:

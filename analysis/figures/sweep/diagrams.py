@@ -118,8 +118,6 @@ def in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
 def one_value(values: Any) -> float | None:
     """Return the value that all numbers share but for rounding; None where they differ, or where there is none.
 
-    Examples
-    --------
     >>> one_value([3.0037242956181855, 3.003724295618186, float("nan")]), one_value([1.0, 1.001])
     (3.0037242956181855, None)
     """
@@ -134,8 +132,6 @@ def one_value(values: Any) -> float | None:
 def is_logarithmic(values: Any) -> bool:
     """Return whether values are those of a sweep with `spacing = "log"`: one ratio, one sign, and a wide range.
 
-    Examples
-    --------
     >>> is_logarithmic([10.0, 100.0, 1000.0]), is_logarithmic([1.0, 2.0, 3.0]), is_logarithmic([2.0, 2.2, 2.42])
     (True, False, False)
     """
@@ -177,16 +173,7 @@ def refuse_variable(dataset: xr.Dataset, variable: str, whose: str) -> None:
 def draw_bifurcation(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     """Draw displacement range and impact velocity against the swept parameter, up and down told apart.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    variable : str, optional
-        Draw this instead: one of `drawable_variables`.
-
-    Raises
-    ------
-    DatasetError
-        Neither was recorded, or the variable was not.
+    A variable, of `drawable_variables`, is drawn instead. What was not recorded raises DatasetError.
     """
     if variable is not None:
         refuse_variable(dataset, variable, "the sweep")
@@ -304,8 +291,6 @@ def _points(
 def crowded(x: Any, y: Any) -> Any:
     """Return how crowded the column of each point is: its distinct values over those that can be told apart.
 
-    Examples
-    --------
     >>> crowded([1.0] * 3 + [2.0] * 300, [0.5] * 3 + [k / 300 for k in range(300)])[[0, -1]].tolist()
     [0.05, 15.0]
     """

@@ -48,18 +48,8 @@ def draw_measured_sweep(dataset: xr.Dataset, over: xr.Dataset | None = None) -> 
     """Draw the range of each recorded period over the swept parameter, up and down told apart.
 
     A clipped step has no points, since its range is that of the input; a mark at the top says where it is. What is
-    flagged otherwise has a ring.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    over : xarray.Dataset, optional
-        Another sweep of the same parameter, drawn below: the simulated one of a measured one.
-
-    Raises
-    ------
-    DatasetError
-        One of them sweeps something else, or has no extrema.
+    flagged otherwise has a ring. Another sweep of the same parameter, such as a simulated one, is drawn below (`over`).
+    One that sweeps something else, or has no extrema, raises DatasetError.
     """
     name = _swept(dataset)
     figure = canvas(65 if over is None else 72)
