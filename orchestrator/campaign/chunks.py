@@ -41,39 +41,26 @@ MANIFEST = "campaign_manifest"
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What all chunks of a campaign have in common; small, sent along with each.
-
-    Attributes
-    ----------
-    scene : Scene
-        With an absolute path for its source: a worker may live in another folder.
-    parts_folder : str
-        Absolute path of the folder that the parts go to.
-    runner : str
-        The runner class as `module:name`.
-    scene_hash : str
-        Written into each part, so that a stray part of another campaign is noticed.
-    identity : RunnerIdentity or None
-        What the runner must be; None while the campaign still asks.
-    execution : str
-        How points run where the campaign has begun so; empty: as the scene says.
-    kept : str
-        File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
-    branches : tuple of Branch
-        The points of a round of an adaptive sweep; empty: those of the scene's sweep.
-    manifest : str
-        Written into each part, from which `campaign.json` is made again; empty: nothing is written.
-    """
+    """What all chunks of a campaign have in common; small, sent along with each."""
 
     scene: Scene
+    """With an absolute path for its source: a worker may live in another folder."""
     parts_folder: str
+    """Absolute path of the folder that the parts go to."""
     runner: str = DEFAULT_RUNNER
+    """The runner class as `module:name`."""
     scene_hash: str = ""
+    """Written into each part, so that a stray part of another campaign is noticed."""
     identity: RunnerIdentity | None = None
+    """What the runner must be; None while the campaign still asks."""
     execution: str = ""
+    """How points run where the campaign has begun so; empty: as the scene says."""
     kept: str = ""
+    """File with the runs of an earlier sweep that are left out of all chunks; it may be absent."""
     branches: tuple[Branch, ...] = ()
+    """The points of a round of an adaptive sweep; empty: those of the scene's sweep."""
     manifest: str = ""
+    """Written into each part, from which `campaign.json` is made again; empty: nothing is written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,24 +91,16 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What a worker says of a chunk whose part is on the disk.
-
-    Attributes
-    ----------
-    chunk : Chunk
-        The runs that the part holds: those asked for, or the first of them.
-    carried : tuple of float or None
-        The state (m, m/s) that the next run of the branch starts from.
-    outcomes : mapping of str to int
-        How many runs ended in each way.
-    compute_seconds : float
-        Wall time of the runs, s.
-    """
+    """What a worker says of a chunk whose part is on the disk."""
 
     chunk: Chunk
+    """The runs that the part holds: those asked for, or the first of them."""
     carried: State | None
+    """The state (m, m/s) that the next run of the branch starts from."""
     outcomes: Mapping[str, int]
+    """How many runs ended in each way."""
     compute_seconds: float
+    """Wall time of the runs, s."""
 
 
 _at_work: dict[Work, tuple[tuple[Branch, ...], OpenedScene]] = {}
@@ -165,10 +144,7 @@ def get_ready(work: Work) -> RunnerIdentity:
 def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     """Run the points of a chunk and write them as one part.
 
-    Raises
-    ------
-    CampaignError
-        When this worker's runner is not the one the campaign began with, or the part cannot be written.
+    CampaignError: the runner is not the one the campaign began with, or the part cannot be written.
     """
     branches, opened = _opened(work)
     _refuse_other_runner(work, opened.runner)

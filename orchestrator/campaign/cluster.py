@@ -86,24 +86,11 @@ LONGEST_TEMPORARY = 75
 def open_workers(
     *, workers: int | None = None, scheduler: str | Client | None = None, progress: Progress | None = None
 ) -> Iterator[WorkerPool]:
-    """Open workers for one campaign and leave no process behind, whatever ends it.
+    """Open workers for one campaign and leave no process behind, whatever ends it; `progress` is told of lost workers.
 
-    Parameters
-    ----------
-    workers : int, optional
-        Number of worker processes on this machine; one for each processor by default.
-    scheduler : str or Client, optional
-        Address of a Dask scheduler (`tcp://host:8786`), or a client of one, to use instead; its workers outlive the
-        campaign, and the client stays as it is.
-    progress : Progress, optional
-        Told of workers that were lost.
-
-    Raises
-    ------
-    UsageError
-        When nothing listens at `scheduler`, or this machine lacks what its own workers need.
-    CampaignError
-        When the workers cannot be started.
+    One worker runs for each processor by default. The scheduler is the address of one of Dask (`tcp://host:8786`), or a
+    client of one, to use instead; its workers outlive the campaign, and the client stays as it is. UsageError: nothing
+    listens there, or this machine lacks what its own workers need. CampaignError: workers cannot be started.
     """
     # Dask warns of workers that end: they are meant to, or an error says it better.
     for name in ("distributed", "distributed.client"):  # which have levels of their own

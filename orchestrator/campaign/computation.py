@@ -33,13 +33,7 @@ class Computation:
         self._alone: Chunk | None = None
 
     def run(self) -> None:
-        """Compute all that is left.
-
-        Raises
-        ------
-        VibroimpactError
-            When a chunk cannot be computed or written.
-        """
+        """Compute all that is left; a chunk that cannot be computed or written raises VibroimpactError."""
         while self._hand_out():
             ended = self._pool.next_finished()
             asked = self._in_flight.pop(ended.ticket)

@@ -98,17 +98,9 @@ def _without_sweep(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
 
 
 def same_runs(old: Scene, new: Scene) -> Runs:
-    """Return which run of an old scene each run of a new one is.
+    """Return which run of an old scene each run of a new one is, shape (run,); -1 where it is none of them.
 
-    Parameters
-    ----------
-    old, new : Scene
-        Scenes that differ in what they sweep only: `other_differences`.
-
-    Returns
-    -------
-    ndarray of int, shape (run,)
-        -1 where it is none of them.
+    The scenes differ in what they sweep only: `other_differences`.
     """
     was, now = _Layout(old.sweep), _Layout(new.sweep)
     adaptive = any(axis.adaptive is not None for axis in (*old.sweep, *new.sweep))
@@ -214,18 +206,9 @@ def _along_branches(was: SweepAxis, now: SweepAxis) -> Runs:
 
 
 def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
-    """Return the rows of an old campaign that a new one keeps.
+    """Return the rows of an old campaign, given in run order, that a new one keeps, with its indices and coordinates.
 
-    Parameters
-    ----------
-    old, new : Scene
-    rows : xarray.Dataset
-        What was computed of the old campaign, in run order; not necessarily all of it.
-
-    Returns
-    -------
-    xarray.Dataset
-        One-dimensional, with the run indices and the coordinates of the new campaign.
+    Not all rows need be there; the dataset is one-dimensional.
     """
     wanted = same_runs(old, new)
     known = rows.run_index.values.astype(np.int64)
@@ -286,30 +269,17 @@ def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """Rows of a campaign that come from an earlier sweep.
-
-    Attributes
-    ----------
-    path : Path
-    runs : ndarray of int, shape (run,)
-        Ascending.
-    stretches : list of StoredPart
-        Neighbouring runs that chunks go round, with the state that the run after them starts from.
-    """
+    """Rows of a campaign that come from an earlier sweep."""
 
     path: Path
     runs: Runs
+    """Ascending, shape (run,)."""
     stretches: list[StoredPart]
+    """Neighbouring runs that chunks go round, with the state that the run after them starts from."""
 
 
 def read_kept(path: Path, scene: Scene) -> Kept:
-    """Read which rows are kept.
-
-    Raises
-    ------
-    DatasetError
-        When the file is damaged.
-    """
+    """Read which rows are kept; a damaged file raises DatasetError."""
     rows = read_flat(path)
     runs = rows.run_index.values.astype(np.int64)
     layout = _Layout(scene.sweep)
@@ -418,13 +388,7 @@ def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:
 
 
 def read_finished(path: Path) -> Part:
-    """Read what the dataset of a campaign says of itself.
-
-    Raises
-    ------
-    DatasetError
-        When it is damaged.
-    """
+    """Read what the dataset of a campaign says of itself; a damaged one raises DatasetError."""
     try:
         return read_part(path)
     except DatasetError as error:

@@ -63,22 +63,10 @@ def opened_here(work: Work) -> Iterator[OpenedScene | None]:
 def computed_here(
     work: Work, stage: Stage, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
 ) -> Stage | None:
-    """Compute a stage until it is complete, or more is left of it than is worth doing here.
+    """Compute a stage until it is complete (None), or until what is left, which is returned, is not worth doing here.
 
-    Parameters
-    ----------
-    work : Work
-        Opened in this process: see `opened_here`.
-    stage : Stage
-    schedule : ChunkSchedule
-        Of the stage, for one worker.
-    done : callable
-        Told of each chunk whose part is on the disk.
-
-    Returns
-    -------
-    Stage or None
-        What is left for workers: the stage with the parts of this process; None where nothing is.
+    The work is opened in this process (`opened_here`), the schedule is for one worker, and `done` is told of each chunk
+    whose part is on the disk. The stage returned has the parts of this process.
     """
     results: list[ChunkResult] = []
     while (chunk := schedule.next_chunk()) is not None:

@@ -53,30 +53,20 @@ class DamagedManifestError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """What a campaign was started with.
-
-    Attributes
-    ----------
-    scene : dict
-        Every number and word of the scene by its key; comments and layout of the file do not count.
-    scene_hash : str
-        SHA-256 of what counts of `scene`; every part of the campaign says it.
-    scene_text : str
-        The TOML text.
-    runs : int
-        Runs of the campaign.
-    identity : RunnerIdentity
-        What ran when it was started.
-    continued_with : tuple of dict
-        Other builds of its components that went on with it, each as `add_build` wrote it.
-    """
+    """What a campaign was started with."""
 
     scene: Mapping[str, Any]
+    """Every number and word of the scene by its key; comments and layout of the file do not count."""
     scene_hash: str
+    """SHA-256 of what counts of `scene`; every part of the campaign says it."""
     scene_text: str
+    """The TOML text."""
     runs: int
+    """Runs of the campaign."""
     identity: RunnerIdentity
+    """What ran when it was started."""
     continued_with: tuple[Mapping[str, Any], ...] = ()
+    """Other builds of its components that went on with it, each as `add_build` wrote it."""
 
     def attributes(self, scene: Scene) -> dict[str, Any]:
         """Return the global attributes of the dataset of this campaign: what began it, and what went on with it."""
@@ -89,8 +79,6 @@ class Manifest:
 def flat_scene(scene: Scene) -> dict[str, Any]:
     """Return a scene as one value for each key, in a fixed order.
 
-    Examples
-    --------
     >>> from vibroimpact.orchestrator.scene import parse_scene
     >>> text = "[body]\\nmass = 2  # heavy\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
     >>> flat_scene(parse_scene(text, "free.toml"))["body.mass"]
@@ -247,10 +235,7 @@ def read_content(path: Path) -> Content:
 def _checked(content: Content) -> Manifest:
     """Return what a manifest says, if it is what was once written.
 
-    Raises
-    ------
-    ValueError, KeyError, TypeError, AttributeError
-        When it is not.
+    Anything else raises ValueError, KeyError, TypeError or AttributeError.
     """
     recorded, found = content.get("sha256"), content_hash(content)
     if recorded is None and content["format"] == 1:
@@ -276,19 +261,9 @@ def _checked(content: Content) -> Manifest:
 
 
 def carried_manifest(content: Content, source: str) -> str:
-    """Return the manifest of a campaign as its parts carry it.
+    """Return the manifest of a campaign, the content of `campaign.json`, as its parts carry it: JSON.
 
-    Parameters
-    ----------
-    content : dict
-        Of `campaign.json`.
-    source : str
-        File beside which the files lie that the scene names.
-
-    Returns
-    -------
-    str
-        JSON; `null` stands for what the scene tells.
+    `null` stands for what the scene tells; files that it names lie beside `source`.
     """
     text, values = content["scene_text"], content["scene"]
     content = {**content, "sha256": content_hash(content)}
@@ -326,13 +301,7 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
-    """Refuse to go on with another scene than the one the campaign was started with.
-
-    Raises
-    ------
-    UsageError
-        With what differs, the first few.
-    """
+    """Raise UsageError with the first few differences between a scene and the one the campaign was started with."""
     shown = "; ".join(different[:_MOST_DIFFERENCES])
     hidden = len(different) - _MOST_DIFFERENCES
     more = f"; and {hidden} more" if hidden > 0 else ""
@@ -366,10 +335,7 @@ def runner_differences(manifest: Manifest, identity: RunnerIdentity) -> list[str
 def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") -> NoReturn:
     """Refuse to mix results of different components, ways of running or instruction sets.
 
-    Raises
-    ------
-    UsageError
-        With what differs, and the reason why the stored points do not show that results are the same all the same.
+    UsageError says what differs, and the reason why stored points do not show equal results.
     """
     raise UsageError(
         message(

@@ -78,17 +78,8 @@ class _Folder:
 def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
     """Return the manifest that the files of a campaign carry, and in words which files; None where none does.
 
-    Parameters
-    ----------
-    home : Path
-        The folder of the campaign.
-    scene : Scene
-        The scene that it is to go on with.
-
-    Raises
-    ------
-    UsageError
-        The files are of several campaigns, or the scene that the manifest needs is not given.
+    `home` is its folder, and the scene is the one it is to go on with. UsageError: the files are of several campaigns,
+    or the scene that the manifest needs is not given.
     """
     there = _read(home / "parts")
     finished = _finished(home / "dataset.nc", scene)
@@ -196,13 +187,7 @@ def _refuse_several(first: _Copy, there: _Folder, *, extended: bool) -> None:
 
 
 def _completed(copy: _Copy, scene: Scene) -> Content:
-    """Return a manifest with what its copy leaves to the scene.
-
-    Raises
-    ------
-    UsageError
-        The scene does not tell what the campaign was started with.
-    """
+    """Return a manifest with what its copy leaves to the scene; UsageError where the scene does not tell."""
     content = dict(copy.content)
     if content["scene_text"] is None and scene_hash(scene) == content["scene_hash"]:
         content |= {"scene": flat_scene(scene), "scene_text": scene.text}

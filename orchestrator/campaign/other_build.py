@@ -39,14 +39,9 @@ OF_THE_MACHINE = ("point_seconds",)
 def compare_with_stored(
     pool: WorkerPool, work: Work, scene: Scene, stored: Sequence[Path]
 ) -> tuple[int, str]:
-    """Compute a few points again, of those in the files of rows that a campaign has.
+    """Compute a few points of the stored files again; return how many, and why they do not show equal results.
 
-    Returns
-    -------
-    compared : int
-        Number of points that were computed again.
-    reason : str
-        Why they do not show that results are the same; empty where all are equal bit for bit.
+    The reason is empty where all are equal bit for bit.
     """
     chosen = list(_chosen(scene, stored))
     if not chosen:

@@ -134,17 +134,8 @@ def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) ->
 def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> xr.Dataset:
     """Write the rows of all parts as one dataset, whole or not at all, with the numbers that the scene does not sweep.
 
-    Returns
-    -------
-    xarray.Dataset
-        What was written.
-
-    Raises
-    ------
-    DatasetError
-        When a part cannot be read or joined with the others; `unfit_parts` finds out which.
-    OSError
-        When the dataset cannot be written.
+    What was written is returned. DatasetError: a part cannot be read or joined with the others; `unfit_parts` finds out
+    which. OSError: the dataset cannot be written.
     """
     dataset = merge_datasets(parts)
     # Those of the first part: what they say of it is not true of all runs.

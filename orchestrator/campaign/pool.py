@@ -80,16 +80,8 @@ class Cluster:
 class WorkerPool:
     """Workers of one Dask cluster, one piece of work at a time on each.
 
-    Messages say `where` they are; `progress` is told of those that were lost.
-
-    Attributes
-    ----------
-    lost_workers : int
-        How many died so far.
-    is_local : bool
-        Whether the workers are processes of this command.
-    connection : ExitStack
-        What closes the connection; a pool that connects anew goes on with it.
+    Messages say `where` they are; `progress` is told of those that were lost, `lost_workers` so far. Local workers are
+    processes of this command. `connection` closes the connection; a pool that connects anew goes on with it.
     """
 
     def __init__(
@@ -116,10 +108,7 @@ class WorkerPool:
     def worker_addresses(self) -> tuple[str, ...]:
         """Return the addresses of the workers that are there now; take note of those that are not any more.
 
-        Raises
-        ------
-        WorkersGoneError
-            When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
+        WorkersGoneError: no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
         """
         self._leave_out_suspension()
         there = self._workers_there()
@@ -179,21 +168,10 @@ class WorkerPool:
             time.sleep(ASK_SECONDS)
 
     def call_everywhere(self, function: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
-        """Call a function once on each worker, in the thread that will also do the work.
+        """Call a function once on each worker, in its working thread; return what each returned, by its address.
 
-        A worker that dies meanwhile is not waited for; the one that comes in its place is asked too.
-
-        Returns
-        -------
-        dict of str to object
-            What each worker, named by its address, returned.
-
-        Raises
-        ------
-        CampaignError
-            When workers die again and again.
-        UsageError
-            When scheduler or workers lack this package.
+        A worker that dies meanwhile is not waited for; the one that comes in its place is asked too. CampaignError:
+        workers die again and again. UsageError: scheduler or workers lack this package.
         """
         calls: dict[str, Future[Any]] = {}
         answers: dict[str, Any] = {}
@@ -268,13 +246,7 @@ class WorkerPool:
         self._futures[ticket].add_done_callback(lambda _future: ended.put(ticket))
 
     def next_finished(self) -> Finished:
-        """Wait for the next piece of work to end.
-
-        Raises
-        ------
-        WorkersGoneError
-            When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
-        """
+        """Wait for the next piece of work to end; WorkersGoneError as of `worker_addresses`."""
         while True:
             if time.monotonic() - self._looked > LOOK_SECONDS:
                 self.worker_addresses()

@@ -39,41 +39,25 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Refined:
-    """The points of a round.
-
-    Attributes
-    ----------
-    values : ndarray of float, shape (point, axis)
-    direction : ndarray of int, shape (point,)
-    below : ndarray of int, shape (point,)
-        Which known point each has before it, by value: where a point of an up branch starts; -1 in a plane.
-    above : ndarray of int, shape (point,)
-        Which one after it.
-    left : int
-        Places where the motion jumps that there was no room for.
-    """
+    """The points of a round."""
 
     values: Floats
+    """Shape (point, axis)."""
     direction: NDArray[np.int64]
+    """Shape (point,)."""
     below: NDArray[np.intp]
+    """Known point before each by value, shape (point,): where one of an up branch starts; -1 in a plane."""
     above: NDArray[np.intp]
+    """Known point after it, shape (point,)."""
     left: int
+    """Places where the motion jumps that there was no room for."""
 
 
 def halved_intervals(known: Known, axis: int, tolerance: float, step: float, room: int) -> Refined:
     """Return the middle of each interval of one axis in which the motion jumps, at most so many, the widest first.
 
-    Parameters
-    ----------
-    known : Known
-        Points of any number of lines along the axis; along each line neighbours are compared.
-    axis : int
-        The one that is refined.
-    tolerance : float
-        No interval of at most this width is halved.
-    step : float
-        Difference of the recorded ranges from which they jump (m).
-    room : int
+    Neighbours are compared along each line of the axis. No interval is halved that is at most as wide as the tolerance;
+    ranges that differ by `step` (m) jump.
     """
     others = np.delete(known.values, axis, axis=1)
     along = known.values[:, axis]
@@ -112,16 +96,8 @@ def cut_cells(
 ) -> Refined:
     """Return the points that cut each cell of a plane at whose corners and edges the motion is not the same.
 
-    Parameters
-    ----------
-    known : Known
-        Points of two axes.
-    start : pair of sequence of float
-        Values that the axes began with, ascending.
-    tolerance : pair of float
-        A cell is cut along an axis while it is wider.
-    step, room
-        As of `halved_intervals`.
+    The values `start` began the two axes, ascending. A cell is cut along an axis while it is wider than the tolerance;
+    `step` and `room` are those of `halved_intervals`.
     """
     plane = _Plane(known, tolerance, step)
     found: dict[tuple[float, float], None] = {}

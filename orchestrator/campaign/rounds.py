@@ -34,23 +34,15 @@ Stored = Callable[[], Sequence[StoredPart]]
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Points that can be computed together.
-
-    Attributes
-    ----------
-    branches : tuple of Branch
-    held : list of StoredPart
-        The runs before `runs` that need not be computed.
-    runs : int
-        Runs of the campaign with this stage.
-    said : str
-        What progress says of it; empty of a plain sweep.
-    """
+    """Points that can be computed together."""
 
     branches: tuple[Branch, ...]
     held: list[StoredPart]
+    """The runs before `runs` that need not be computed."""
     runs: int
+    """Runs of the campaign with this stage."""
     said: str = ""
+    """What progress says of it; empty of a plain sweep."""
 
 
 def adaptive_axes(scene: Scene) -> tuple[SweepAxis, ...]:
@@ -216,14 +208,7 @@ def stages_of(
 ) -> Iterator[Stage]:
     """Yield what a campaign has to compute, one after the other: its sweep, or each round of an adaptive one.
 
-    Parameters
-    ----------
-    scene : Scene
-    rounds : Rounds or None
-        None of a plain sweep.
-    stored : callable
-    kept : sequence of StoredPart
-        Stretches of runs that are kept from an earlier sweep.
+    Rounds are None of a plain sweep; `kept` are stretches of runs from an earlier sweep.
     """
     if rounds is not None:
         yield from rounds.stages(stored)

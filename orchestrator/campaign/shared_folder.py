@@ -14,12 +14,9 @@ if TYPE_CHECKING:
 
 
 def answer_question(folder: str, name: str) -> str:
-    """Read a question in a folder and leave an answer beside it; runs on a worker.
+    """Read a question in a folder, on a worker, and leave an answer beside it, whose name is returned.
 
-    Returns
-    -------
-    str
-        Name of the answer; empty when the worker does not see the question or cannot write.
+    It is empty when the worker does not see the question or cannot write.
     """
     answer = f".answer-{name}-{secrets.token_hex(8)}"
     try:
@@ -32,13 +29,7 @@ def answer_question(folder: str, name: str) -> str:
 
 
 def refuse_blind_workers(pool: WorkerPool, folder: Path) -> None:
-    """Refuse workers that do not read and write the same folder as this process.
-
-    Raises
-    ------
-    UsageError
-        With the addresses of the workers that do not see it.
-    """
+    """Raise UsageError with the workers that do not read and write the same folder as this process."""
     name = secrets.token_hex(16)
     question = folder / f".question-{name}"
     question.write_text(name, encoding="ascii")

@@ -65,12 +65,8 @@ class PointProcess:
     def answers(self, seconds: float) -> tuple[list[Any], bool]:
         """Wait until there is something to read; return the answers, and whether no more of them come.
 
-        The last answer of a child that is gone is None.
-
-        Raises
-        ------
-        TimeoutError
-            The child has not rung its bell; what it had answered is among `end`'s answers.
+        The last answer of a child that is gone is None. TimeoutError: the child has not rung its bell; what it had
+        answered is among `end`'s answers.
         """
         if self._reader is not None:
             try:
@@ -87,15 +83,7 @@ class PointProcess:
         return answers, last or answers[-1] is None
 
     def end(self, *, at_once: bool = False) -> tuple[int, list[Any]]:
-        """End the child, by force if it does not by itself.
-
-        Returns
-        -------
-        code : int
-            Its exit code (negative: the signal).
-        answers : list
-            What it had answered and nobody has read.
-        """
+        """End the child, by force if needed; return its exit code (negative: the signal) and unread answers."""
         if at_once:
             self._process.terminate()
         code = self._process.end(END_TIME)
