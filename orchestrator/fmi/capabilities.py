@@ -31,27 +31,17 @@ class Treatment(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """A capability flag.
-
-    Attributes
-    ----------
-    name : str
-        The attribute of a model description.
-    owner : str
-        What has it: one of the interfaces, a variable, or a clock.
-    versions : str
-        Versions of FMI that have it.
-    treatment : Treatment
-        Whether it is heeded.
-    how : str
-        In which way.
-    """
+    """A capability flag, the attribute of a model description."""
 
     name: str
     owner: str
+    """What has it: one of the interfaces, a variable, or a clock."""
     versions: str
+    """Versions of FMI that have it."""
     treatment: Treatment
+    """Whether it is heeded."""
     how: str
+    """In which way."""
 
 
 def _heeded(name: str, versions: str, how: str, owner: str = CO_SIMULATION) -> Flag:

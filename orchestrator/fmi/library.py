@@ -17,13 +17,9 @@ Function = Callable[..., Any]
 class Library:
     """The functions of one FMU binary.
 
-    The functions have no argument types: their callers pass ready-made ctypes objects only, which takes two
-    thirds of the time of converted arguments.
-
-    Raises
-    ------
-    ComponentFileError
-        There is no binary for this machine, or the system cannot load it.
+    The functions have no argument types: their callers pass ready-made ctypes objects only, which takes two thirds of
+    the time of converted arguments. A binary that is not there for this machine, or does not load, raises
+    ComponentFileError.
     """
 
     def __init__(self, fmu: UnpackedFmu) -> None:

@@ -15,10 +15,7 @@ INITIAL_ITERATIONS = 100
 def settle_connections(transfers: Sequence[Transfer], loops: LoopSolver, time: float) -> None:
     """Carry start values over the connections until they no longer change: as many passes as chains are long.
 
-    Raises
-    ------
-    ComponentError
-        They never do.
+    ComponentError: they never do.
     """
     for _ in range(INITIAL_ITERATIONS):
         before = [transfer.write.values.copy() for transfer in transfers]

@@ -209,10 +209,7 @@ class Component:
     def clocked(self, group: VariableGroup, names: Sequence[str]) -> VariableGroup:
         """Let a group of variables of clocks be moved only while one of these ticks; between, it keeps its values.
 
-        Raises
-        ------
-        ComponentError
-            The variables have different clocks.
+        Variables with different clocks raise ComponentError.
         """
         clocks = {self.clocks_of(name) for name in names}
         if not self.capabilities.clocks or clocks <= {frozenset()}:
@@ -317,10 +314,7 @@ class Component:
     def step_from_start(self, time: float, size: float) -> None:
         """Go back to the start of the step just made, at `time`, and `size` s into it again.
 
-        Raises
-        ------
-        ComponentError
-            It ends before: what it does depends on more than its state.
+        ComponentError: it ends before, so that what it does depends on more than its state.
         """
         self.revisit_start()
         instance = self.instance

@@ -28,21 +28,7 @@ CONTACT_STEPS = 30
 
 
 class ContactBonds:
-    """All contacts of an importer whose stops may yield.
-
-    Attributes
-    ----------
-    ports : list of ContactBond
-        Those of a body's contact port, which follows the force and slopes of a stop.
-    held : list of HeldForceBond
-        Those of any other body, which holds a force over a step.
-    pairs : Pairs
-        Those of two bodies that hit each other.
-    active : bool
-        Any of them is closed in the step under way, or may have to be repeated.
-    met_at_start : list of Component
-        Where the step under way is the first: the bodies without event mode whose contacts begin with it.
-    """
+    """All contacts of an importer whose stops may yield."""
 
     def __init__(
         self,
@@ -61,15 +47,20 @@ class ContactBonds:
             for c in connections
             if _is_contact_force(components[c.target[0]], c.target[1])
         ]
+        """Those of a body's contact port, which follows the force and slopes of a stop."""
         inputs: dict[tuple[str, str], ForceInput] = {}
         self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
+        """Those of any other body, which holds a force over a step."""
         self.pairs = Pairs(components, pairs, inputs)
+        """Those of two bodies that hit each other."""
         self._components, self._inputs = components, inputs
         self._rigid: dict[str, RigidStop] = {}
         self._held: list[HeldForceBond] = []
         self._following: list[ContactBond | HeldForceBond | Pair] = []
         self.met_at_start: list[Component] = []
+        """Where the step under way is the first: bodies without event mode whose contacts begin with it."""
         self.active = False
+        """Any of them is closed in the step under way, or may have to be repeated."""
 
     def _all(self) -> list[ContactBond | HeldForceBond]:
         return [*self.ports, *self.held]

@@ -68,19 +68,8 @@ NO_EVENTS = LateEvents(lambda: 0, lambda events: None)
 class EventMode:
     """Resolves events: carries values, updates discrete states until all are settled, goes back to step mode.
 
-    Parameters
-    ----------
-    components : sequence of Component
-        All of an importer; those of FMI 3.0 with event mode take part in it.
-    transfers, behind : sequence of Transfer
-        All of an importer, and those that a component's own step has not been preceded by.
-
-    Attributes
-    ----------
-    instances : list of Instance3
-        Those that take part.
-    begin, again, leave : CallList
-        The calls into event mode, those of one more iteration, and those back to step mode.
+    All components of an importer are given, of which those of FMI 3.0 with event mode take part; `behind` are the
+    transfers that a component's own step has not been preceded by.
     """
 
     def __init__(
@@ -88,6 +77,7 @@ class EventMode:
     ) -> None:
         with_events = [c.instance for c in components if c.event_mode]
         self.instances = [i for i in with_events if isinstance(i, Instance3)]
+        """Those that take part."""
         enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in self.instances]
         update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in self.instances]
         leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in self.instances]
@@ -95,19 +85,19 @@ class EventMode:
         first = [call for t in behind if _takes_events(t.target) for call in t.calls()]
         moves = [call for t in transfers if _takes_events(t.target) for call in t.calls()]
         self.begin = CallList([*enter, *first, *update])
+        """The calls into event mode."""
         self._enter, self._update = CallList(enter), CallList(update)
         self._moves = CallList(moves)
         self._begin_run = CallList([*first, *update])  # initialization ends in event mode
         self.again = CallList([*moves, *update])
+        """The calls of one more iteration."""
         self.leave = CallList(leave)
+        """The calls back to step mode."""
 
     def resolve(self, time: float, ticks: Ticks) -> bool:
         """Resolve the events at `time`, s, and let clocks tick; returns whether a component asks for the end.
 
-        Raises
-        ------
-        ComponentError
-            A component fails, or never settles.
+        A component that fails, or never settles, raises ComponentError.
         """
         if ticks.are_due(time):
             self._enter()

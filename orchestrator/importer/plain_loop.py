@@ -205,23 +205,11 @@ class PlainLoop:
     def advance(
         self, end: float, macro_step: float, seconds: float, late: LateEvents | None, *, hears_pauses: bool
     ) -> CouplingEnd:
-        """Make plain steps.
+        """Make plain steps to the end (s), each at most `macro_step` long, in at most so many seconds of wall time.
 
-        Parameters
-        ----------
-        end, macro_step : float
-            Time to advance to, and the longest step, s.
-        seconds : float
-            Wall time that it may take, s.
-        late : LateEvents or None
-            What hears of the events that pass; None: nobody does.
-        hears_pauses : bool
-            A step that ends early without an event is left to the caller.
-
-        Returns
-        -------
-        CouplingEnd
-            `done`, `listen`; or what is left of a step, which `run` has: it is the caller's.
+        Events that pass are heard of by `late`, or nobody. With `hears_pauses` a step that ends early without an event
+        is left to the caller. It ends as `done`, `listen`, or with what is left of a step, which `run` has: it is the
+        caller's.
         """
         run = self.run
         run.end, run.macro_step, run.hears_pauses = end, macro_step, hears_pauses

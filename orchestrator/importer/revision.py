@@ -43,12 +43,8 @@ class Bracket:
 class Watch:
     """A watched variable of a component with states.
 
-    Attributes
-    ----------
-    accumulated : bool
-        Its events came too close to be told apart and are no longer located.
-    last_time : float
-        Time of the last event located, s.
+    `accumulated` events came too close to be told apart and are no longer located; the last located one was at
+    `last_time`, s.
     """
 
     def __init__(self, component: Component, event: EventSpec) -> None:
@@ -143,20 +139,10 @@ class Watch:
 def refine(bracket: Bracket, value: Callable[[float], float], precision: float) -> float:
     """Narrow a bracket to `precision` and return its far end.
 
-    Guesses come from a parabola through the last near points, as values on the far side may be anything: the FMU
-    may have reset its state there. A guess that does not pay is followed by a bisection.
+    Guesses come from a parabola through the last near points, as values on the far side may be anything: the FMU may
+    have reset its state there. A guess that does not pay is followed by a bisection. The bracket has near side > 0 >=
+    far side; the value is the signed distance at a number of seconds.
 
-    Parameters
-    ----------
-    bracket : Bracket
-        Near side > 0 >= far side.
-    value : callable
-        Signed distance at a number of seconds.
-    precision : float
-        Seconds.
-
-    Examples
-    --------
     >>> round(refine(Bracket(0.0, 1.0, 2.0), lambda u: 1.0 - u * u, 1e-13), 12)
     1.0
     """

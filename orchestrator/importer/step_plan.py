@@ -20,22 +20,15 @@ from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, moves
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What an importer is made of.
-
-    Attributes
-    ----------
-    components : sequence of Component
-        In the order in which they are stepped.
-    numbers : mapping of str to int
-        Their places in the order in which they are told of.
-    looping : sequence of Transfer
-        The transfers that belong to algebraic loops.
-    """
+    """What an importer is made of."""
 
     components: Sequence[Component]
+    """In the order in which they are stepped."""
     numbers: Mapping[str, int]
+    """Their places in the order in which they are told of."""
     transfers: Sequence[Transfer]
     looping: Sequence[Transfer]
+    """The transfers that belong to algebraic loops."""
     loops: LoopSolver
     watches: Sequence[Watch]
     contacts: ContactBonds

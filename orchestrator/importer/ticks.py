@@ -58,18 +58,7 @@ class _Clock:
 
 
 class Ticks:
-    """The clocks of all components.
-
-    Parameters
-    ----------
-    components : iterable of Component
-        Those of an importer.
-
-    Attributes
-    ----------
-    next : float
-        Where a clock ticks next, s; infinite without clocks.
-    """
+    """The clocks of all components of an importer; `next` is where a clock ticks next, s, infinite without clocks."""
 
     def __init__(self, components: Iterable[Component]) -> None:
         self._clocks = [_Clock(c, clock) for c in components for clock in c.capabilities.clocks]
@@ -83,10 +72,7 @@ class Ticks:
     def begin(self, start: float) -> None:
         """Start a run at `start`, s; its components are in initialization mode.
 
-        Raises
-        ------
-        ComponentError
-            A clock has no interval.
+        ComponentError: a clock has no interval.
         """
         for clock in self._clocks:
             clock.begin(start)
@@ -99,10 +85,7 @@ class Ticks:
     def set(self, time: float) -> None:
         """Let the clocks that are due tick; their components are in event mode.
 
-        Raises
-        ------
-        ComponentError
-            A component refuses, or an interval is lost in the rounding of the time.
+        ComponentError: a component refuses, or an interval is lost in the rounding of the time.
         """
         self._ticking = {}
         for clock in self._clocks:

@@ -24,16 +24,8 @@ class Tuning:
     """The connections to tunable parameters.
 
     Inputs may change at any time, parameters at events only: so those are moved once a step is agreed and its events
-    are resolved, and never in a step that may be taken back. What feeds them is given its own inputs before.
-
-    Parameters
-    ----------
-    components : dict of str to Component
-        All of an importer.
-    connections : sequence of ConnectionSpec
-        Those to tunable parameters.
-    transfers : sequence of Transfer
-        All others, in their order.
+    are resolved, and never in a step that may be taken back. What feeds them is given its own inputs before, by all
+    other transfers, in their order.
     """
 
     def __init__(
@@ -58,10 +50,7 @@ class Tuning:
     def resolve(self, time: float) -> bool:
         """Give the parameters that have changed their values at `time`, s; returns whether one asks for the end.
 
-        Raises
-        ------
-        ComponentError
-            A component fails, or never settles.
+        A component that fails, or never settles, raises ComponentError.
         """
         for transfer in self._feeding:
             transfer.move()

@@ -113,13 +113,6 @@ class Transfer:
     """Connections from one component to another that are moved by one read and one write.
 
     Where the two sides have the same type and no gains, both use one buffer and nothing is copied.
-
-    Attributes
-    ----------
-    read, write : VariableGroup
-        Groups of outputs and of inputs.
-    convert : callable or None
-        Carries the values read to those written, and returns status 0; None when they share one buffer.
     """
 
     def __init__(self, source: Component, target: Component, connections: Connections) -> None:
@@ -135,6 +128,7 @@ class Transfer:
         written = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
         self.write = target.clocked(written, [c.target[1] for c in connections])
         self.convert: Callable[[], int] | None = None if shared else self._converter()
+        """Carries the values read to those written, returns status 0; None when they share one buffer."""
         self._bind_rates()
 
     def _converter(self) -> Callable[[], int]:
@@ -243,14 +237,9 @@ SMALLEST = 1e-300
 
 
 class SettlingInputs:
-    """Inputs of a step that is repeated until those of its end are the same as before.
+    """Inputs of a step, given by transfers, that is repeated until those of its end are the same as before.
 
-    Parameters
-    ----------
-    transfers : sequence of Transfer
-        What gives them.
-    tolerance : float
-        Relative difference of values that are the same.
+    The tolerance is the relative difference of values that are the same.
     """
 
     def __init__(self, transfers: Sequence[Transfer], tolerance: float) -> None:
@@ -386,13 +375,6 @@ class LoopSolver:
     """Solves the algebraic loops of an exchange by fixed-point iteration with Anderson's acceleration.
 
     A linear loop of n connections settles after n + 1 iterations, whatever its gain (but 1).
-
-    Attributes
-    ----------
-    residual : float
-        Largest relative change of a loop's inputs in the last iteration.
-    iterations : int
-        Iterations that the last solution took.
     """
 
     def __init__(
@@ -403,7 +385,9 @@ class LoopSolver:
         inside = [c for loop in loops for c in loop]
         self.transfers = [Transfer(components[c.source[0]], components[c.target[0]], [c]) for c in inside]
         self.residual = 0.0
+        """Largest relative change of a loop's inputs in the last iteration."""
         self.iterations = 0
+        """Iterations that the last solution took."""
 
     def _values(self) -> NDArray[np.float64]:
         return np.array([float(transfer.take()[0]) for transfer in self.transfers])
@@ -414,13 +398,7 @@ class LoopSolver:
             transfer.write.set()
 
     def solve(self, time: float) -> None:
-        """Iterate the loops' inputs until they are consistent.
-
-        Raises
-        ------
-        ComponentError
-            They do not settle; the message names the loop.
-        """
+        """Iterate the loops' inputs until they are consistent; ComponentError with the loop if they do not settle."""
         if not self.transfers:
             return
         guess = self._values()

@@ -22,19 +22,7 @@ REST_TOLERANCE = 1e-10
 
 
 class Pairs:
-    """All pairs of bodies of an importer that hit each other.
-
-    Attributes
-    ----------
-    specified : list of Pair
-        In the order of their specifications.
-    pairs : list of Pair
-        These, and the bodies of other tools at the rigid stops of the run.
-    scale : Scale
-        What is small beside the motion of any of them.
-    pulses : Pulses
-        The impulses of bodies of other tools.
-    """
+    """All pairs of bodies of an importer that hit each other."""
 
     def __init__(
         self,
@@ -43,13 +31,17 @@ class Pairs:
         inputs: dict[tuple[str, str], ForceInput],
     ) -> None:
         self.scale = Scale()
+        """What is small beside the motion of any of them."""
         self.pulses = Pulses(components)
+        """The impulses of bodies of other tools."""
         self.specified = []
+        """In the order of their specifications."""
         for spec in specs:
             impulses = self.pulses if spec.law == "restitution" else None
             lower, upper = (end_of(components, end, inputs, impulses) for end in (spec.lower, spec.upper))
             self.specified.append(Pair(spec, lower, upper, self.scale, self.pulses))
         self.pairs = self.specified
+        """These, and the bodies of other tools at the rigid stops of the run."""
 
     def begin(self, time: float, stops: Sequence[Pair] = ()) -> None:
         """Start a run: initialization has ended, and these are its rigid stops."""
@@ -72,17 +64,9 @@ class Pairs:
         return bool(self.pairs)
 
     def resolve(self, time: float) -> list[str]:
-        """Give the impulses of the instant `time`, s, if there are any.
+        """Give the impulses of the instant `time`, s, if there are any; return the lower body of each impact.
 
-        Returns
-        -------
-        bodies : list of str
-            The lower body of each impact.
-
-        Raises
-        ------
-        ComponentError
-            The impulses do not end, or bodies are pressed together.
+        Impulses that do not end, or bodies that are pressed together, raise ComponentError.
         """
         hit: list[str] = []
         if not any(pair.is_due(pair.look(), time) for pair in self.pairs):

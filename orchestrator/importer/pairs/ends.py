@@ -33,14 +33,7 @@ class Motion(NamedTuple):
 class PortEnd:
     """The contact port of a body of this package, as one end of a pair.
 
-    Attributes
-    ----------
-    body : Component
-        Its body.
-    name : str
-        `body.contact[k]`.
-    mass : float
-        Impulse over the change of its velocity, kg; known once a run has begun.
+    Its name is `body.contact[k]`; its mass is impulse over the change of its velocity, kg, known once a run has begun.
     """
 
     def __init__(
@@ -91,15 +84,7 @@ class PortEnd:
 
 
 class PointEnd:
-    """The point of a body of any tool, as one end of a pair: it takes a force, and an impulse as a pulse of that.
-
-    Attributes
-    ----------
-    body, name : Component, str
-        As those of `PortEnd`.
-    pulse : Pulse or None
-        Its impulses; None where the law yields.
-    """
+    """The point of a body of any tool, as one end of a pair: it takes a force, and an impulse as a pulse of that."""
 
     def __init__(
         self,
@@ -116,6 +101,7 @@ class PointEnd:
         self._input = inputs.setdefault(place, ForceInput(self.body, point.force))
         self._trials = TrialSteps(self.body, point.velocity, self._input)
         self.pulse = None if pulses is None else pulses.of(point, self._input)
+        """Its impulses; None where the law yields."""
 
     @property
     def mass(self) -> float:
@@ -161,17 +147,7 @@ class PointEnd:
 
 
 class SurfaceEnd:
-    """The surface of a rigid stop, as one end of a pair: nothing moves it.
-
-    Attributes
-    ----------
-    body, name : Component, str
-        As those of `PortEnd`: of the stop.
-    mass : float
-        Infinite.
-    position : float
-        Where it is, m.
-    """
+    """The surface of a rigid stop, at a position in m, as one end of a pair: nothing moves it, its mass is infinite."""
 
     mass, position = math.inf, 0.0
 

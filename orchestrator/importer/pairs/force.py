@@ -78,12 +78,7 @@ class PairLaw:
 class PairForce:
     """The force of one contact between two bodies over the step under way.
 
-    Attributes
-    ----------
-    value : float
-        The force that presses both apart, N.
-    resting : bool
-        The law is restitution, and the bodies stay together.
+    The value (N) presses both apart; resting bodies, of the law restitution, stay together.
     """
 
     def __init__(self, spec: PairSpec) -> None:

@@ -19,16 +19,10 @@ ROUNDING = 0.01
 
 
 class MeetingSearch:
-    """The search of one step for the first instant at which two bodies meet.
+    """The search of one step for the first instant at which two bodies meet: their gap is below `room`, m.
 
-    Parameters
-    ----------
-    motion_at : callable
-        Takes the bodies to so many seconds into the step, and returns the pair there.
-    scale : Scale
-        The largest displacement and speed.
-    room : float
-        The gap below which bodies touch, m.
+    `motion_at` takes the bodies to so many seconds into the step, and returns the pair there. The scale is the largest
+    displacement and speed.
     """
 
     def __init__(self, motion_at: Callable[[float], Motion], scale: Scale, room: float) -> None:

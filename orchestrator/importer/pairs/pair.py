@@ -56,22 +56,10 @@ SLACK = 1.5
 
 
 class Pair:
-    """Two bodies that hit each other.
+    """Two bodies that hit each other, named `lower.contact[k] - upper.contact[k]`; their steps may always be repeated.
 
-    Attributes
-    ----------
-    name : str
-        `lower.contact[k] - upper.contact[k]`.
-    lower, upper : PortEnd, PointEnd or SurfaceEnd
-        The gap between them closes as the displacement of the lower one grows.
-    active : bool
-        Steps may have to be repeated: always.
-    restitution : float
-        Coefficient of restitution.
-    impacts : ContactImpacts
-        Those of the run.
-    begins_pressed : bool
-        The step under way is the first, and a contact that yields begins with it.
+    The gap between them closes as the displacement of the lower one grows. `begins_pressed`: the step under way is the
+    first, and a contact that yields begins with it.
     """
 
     active = True
@@ -109,13 +97,7 @@ class Pair:
         self.yields = self._force.law is not None
 
     def begin(self, time: float) -> None:
-        """Start a run.
-
-        Raises
-        ------
-        ComponentError
-            The bodies overlap.
-        """
+        """Start a run; bodies that overlap raise ComponentError."""
         self.lower.begin(time)
         self.upper.begin(time)
         self.impacts.forget()
@@ -265,10 +247,7 @@ class Pair:
     def end_step(self, size: float) -> None:
         """The step of `size` s counts.
 
-        Raises
-        ------
-        ComponentError
-            The bodies have come deep into each other: the forces of several at rest did not agree.
+        ComponentError: the bodies have come deep into each other, as the forces of several at rest did not agree.
         """
         end = self._time + size
         deep = DEEP * max(self._scale.displacement, self._held_back()) + self._room
@@ -338,16 +317,9 @@ class Pair:
         return self.look(seconds)
 
     def strike(self, now: Motion, time: float, *, is_first: bool) -> None:
-        """Give both bodies the impulse of their impact; bounces that accumulate end in rest.
+        """Give both bodies, now before their impact, its impulse; bounces that accumulate end in rest.
 
-        Parameters
-        ----------
-        now : Motion
-            The pair before it.
-        time : float
-            s.
-        is_first : bool
-            The bodies met by themselves: no other impact of this instant has thrown them at each other.
+        The first has bodies that met by themselves: no other impact of this instant has thrown them at each other.
         """
         restitution = 0.0 if is_first and self._accumulates(now, time) else self.restitution
         impulse = (1.0 + restitution) * now.closing * self._reduced

@@ -17,16 +17,8 @@ from vibroimpact.orchestrator.importer.stop_contacts.pulse import UNKNOWN_MASS, 
 class RigidStop(Pair):
     """A body of any tool, and a stop that answers the speed of each impact with a coefficient of restitution.
 
-    Parameters
-    ----------
-    components : mapping of str to Component
-        By name.
-    bond : HeldForceBond
-        The contact; its stop says in each run whether it is rigid.
-    pairs : Pairs
-        Those of the importer, with which it shares the scale of its motion and the impulses of its body.
-    inputs : dict
-        The force inputs so far.
+    The stop of the contact says in each run whether it is rigid. The pairs of the importer share the scale of its
+    motion and the impulses of its body; `inputs` are the force inputs so far.
     """
 
     def __init__(

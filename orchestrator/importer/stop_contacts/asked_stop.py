@@ -31,17 +31,8 @@ DEEPER = 16.0
 def depth_that_stops(force_at: Callable[[float], float], energy: float, guess: float) -> float | None:
     """Return a depth at which force times depth is about an energy, m; None where the stop does not answer so.
 
-    Parameters
-    ----------
-    force_at : callable
-        The stop's force (N) at a depth (m).
-    energy : float
-        mass * speed^2, J; > 0.
-    guess : float
-        A first depth, m; > 0.
+    The stop's force is in N at a depth in m; the energy, mass * speed^2 (J), and the guess of a depth (m) are > 0.
 
-    Examples
-    --------
     >>> depth = depth_that_stops(lambda depth: 1e4 * depth, 1.0, 1e-3)
     >>> 0.8 < 1e4 * depth**2 < 1.25
     True
@@ -60,13 +51,7 @@ def depth_that_stops(force_at: Callable[[float], float], energy: float, guess: f
 
 
 class ContactWork:
-    """The energy that contacts take up, from the work of each step.
-
-    Attributes
-    ----------
-    steps, contacts : int
-        So far.
-    """
+    """The energy that contacts take up, from the work of each step; `steps` and `contacts` are counted."""
 
     def __init__(self) -> None:
         self.steps = self.contacts = 0
@@ -98,12 +83,8 @@ class ContactWork:
 class AskedStop:
     """The stop of a contact, in the direction into it: displacements grow on the way in.
 
-    Attributes
-    ----------
-    sign : float
-        1 for a stop above the body, -1 for one below: displacement into it = sign * displacement.
-    surface : float or None
-        Where its force begins, in that direction, m; None while nobody knows.
+    The sign is 1 for a stop above the body, -1 for one below: displacement into it = sign * displacement. Its force
+    begins at the surface, in that direction, m; None while nobody knows.
     """
 
     def __init__(self, component: Component, spec: StopContactSpec) -> None:

@@ -63,18 +63,7 @@ class _Answer:
 class ContactBond:
     """One contact port of a body, and the component that answers it with a force.
 
-    Attributes
-    ----------
-    name : str
-        `body.contact[k]`.
-    body, stop : Component
-        Its two sides.
-    active : bool
-        The contact is closed in the step under way, or may be.
-    start : _Answer
-        The contact at the start of that step.
-    gives_slopes : bool
-        The stop answers with slopes.
+    Its name is `body.contact[k]`, and `start` the contact at the start of the step under way.
     """
 
     def __init__(
@@ -90,6 +79,7 @@ class ContactBond:
             for last in (FORCE, STIFFNESS, DAMPING)
         }
         self.gives_slopes = any(self._answers[last] is not None for last in (STIFFNESS, DAMPING))
+        """The stop answers with slopes."""
         found = [connection for connection in self._answers.values() if connection is not None]
         self._asked = self.stop.group("Float64", [c.source[1] for c in found])
         self._told = list(self._answers.values())
@@ -108,6 +98,7 @@ class ContactBond:
         self._probe_state = c_void_p()
         self.follows = False
         self.active = False
+        """The contact is closed in the step under way, or may be."""
 
     @staticmethod
     def _connection(transfers: Sequence[Transfer], target: str) -> ConnectionSpec | None:
@@ -162,14 +153,9 @@ class ContactBond:
         return _Answer(self.penetration_at(displacement), self.sign * velocity, force, stiffness, damping)
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
-        """Look at the contact before a step; returns where the step should end, s.
+        """Look at the contact before a step from `time` to `target` (s); returns where the step should end, s.
 
-        Parameters
-        ----------
-        time, target : float
-            Start and end of the step, s.
-        steps : float
-            Steps that a contact is divided into.
+        A contact is divided into so many steps.
         """
         if not self.follows:
             return target

@@ -28,12 +28,7 @@ MASS_TOLERANCE = 0.05
 class ForceInput:
     """An input that takes the sum of the forces of one or several contacts.
 
-    Attributes
-    ----------
-    name : str
-        The input.
-    parts : dict of str to float
-        The force of each contact, along the displacement, N.
+    The parts are the force of each contact, along the displacement, N.
     """
 
     def __init__(self, body: Component, name: str) -> None:
@@ -48,16 +43,9 @@ class ForceInput:
 
 
 class TrialSteps:
-    """Steps of a body with states from where it is now, each with another force.
+    """Steps of a body with states from where it is now, each with another force on a point.
 
-    Parameters
-    ----------
-    body : Component
-        The body.
-    velocity : str
-        The output that says the velocity of its point.
-    force : ForceInput
-        The force on that point.
+    The velocity is the output that says the velocity of the point.
     """
 
     def __init__(self, body: Component, velocity: str, force: ForceInput) -> None:
@@ -122,12 +110,7 @@ class TrialSteps:
     def check_mass(self, given: float, time: float, size: float) -> None:
         """Compare a mass that is given (kg) with what a communication step of `size` s says, whole and a part of it.
 
-        A body whose velocity answers no trial is taken at its word.
-
-        Raises
-        ------
-        ComponentError
-            Neither agrees.
+        A body whose velocity answers no trial is taken at its word. ComponentError: neither agrees.
         """
         trials = (TRIAL_STEP * size, size)
         found = [self.found_mass(time, trial, size) for trial in trials]
@@ -155,10 +138,7 @@ class TrialSteps:
     def measured_mass(self, time: float, size: float) -> float:
         """Return the effective mass of the point by a part of a communication step of `size` s, kg.
 
-        Raises
-        ------
-        ComponentError
-            The whole step changes the velocity as the part does.
+        ComponentError: the whole step changes the velocity as the part does.
         """
         trials = (TRIAL_STEP * size, size)
         found = [self.found_mass(time, trial, size) for trial in trials]
@@ -196,8 +176,6 @@ class TrialSteps:
 def agrees(given: float, found: float) -> bool:
     """Is a given mass the one that was found, as far as steps are chosen by it?
 
-    Examples
-    --------
     >>> agrees(1.0, 1.01), agrees(1000.0, 1.0)
     (True, False)
     """

@@ -67,34 +67,11 @@ TELLING = 0.05
 
 
 class HeldForceBond:
-    """One contact of a body that holds its force over a step.
+    """One contact of a body that holds its force over a step, named `stop.output -> body.input`.
 
-    Attributes
-    ----------
-    name : str
-        `stop.output -> body.input`.
-    contact : StopContactSpec
-        The contact.
-    body, stop : Component, AskedStop
-        The body and its stop.
-    given_mass : float or None
-        Effective mass that is given, kg.
-    revisable : bool
-        Its steps can be repeated.
-    active : bool
-        The step under way may have to be repeated, or the contact is closed in it.
-    closed : bool
-        The contact is closed in the step under way.
-    arrived : bool
-        The step just made has ended at the surface.
-    begins_pressed : bool
-        The step under way is the first, and the contact begins with it.
-    mass : float or None
-        Effective mass of the contact point, kg; None until a trial step finds it.
-    residual : float
-        Energy that the body was given beyond the law of the stop, J.
-    impacts : ContactImpacts
-        Those of the run.
+    `active`: the step under way may have to be repeated, or the contact is `closed` in it. `arrived`: the step just
+    made has ended at the surface. `begins_pressed`: the step under way is the first, and the contact begins with it.
+    The effective mass of the contact point (kg) is None until a trial step finds it.
     """
 
     def __init__(
@@ -111,10 +88,13 @@ class HeldForceBond:
         self._input = inputs.setdefault((spec.body, spec.force), ForceInput(self.body, spec.force))
         self._trials = TrialSteps(self.body, spec.velocity, self._input)
         self.revisable = self.body.has_states
+        """Its steps can be repeated."""
         self.given_mass = spec.mass
+        """Effective mass that is given, kg."""
         self.impacts = ContactImpacts()
         self.active = self.closed = self.arrived = self.begins_pressed = False
         self.residual = 0.0
+        """Energy that the body was given beyond the law of the stop, J."""
 
     def begin(self) -> None:
         """Start a run: the parameters are set."""

@@ -27,14 +27,7 @@ def plain_contact(
 ) -> StopContactSpec | None:
     """Return the contact that a plain connection of an ImpactStop's force closes; None where it closes none.
 
-    Parameters
-    ----------
-    variables : mapping
-        The names of the variables of each component.
-    connections : sequence of ConnectionSpec
-        All of an importer.
-    force : ConnectionSpec
-        The one in question.
+    The variables of each component are given by name, the connections are all of an importer.
     """
     (stop, output), (body, target) = force.source, force.target
     port = target.rpartition(".")[0]
@@ -57,10 +50,7 @@ def plain_contact(
 class PlainContact:
     """A stop whose force a body gets by a plain connection.
 
-    Attributes
-    ----------
-    residual : float
-        Energy that the body was given beyond the law of the stop, J.
+    The residual is the energy that the body was given beyond the law of the stop, J.
     """
 
     def __init__(

@@ -36,18 +36,10 @@ PART = "impulse"
 
 
 class Pulse:
-    """The impulses that one point of a body is given.
+    """The impulses that one point of a body is given; a `ready` one takes part in the run.
 
-    Attributes
-    ----------
-    owed : float
-        Impulse that the point has got and its body has not yet, N s.
-    given : float or None
-        Effective mass of the point that is given, kg, if one is.
-    mass : float
-        Likewise by the last measurement, kg.
-    ready : bool
-        It takes part in the run.
+    The point has got the impulse `owed` (N s), and its body not yet. Its effective mass (kg) is `given`, if one is, and
+    `mass` by the last measurement.
     """
 
     def __init__(self, body: Component, point: BodyPoint, force: ForceInput) -> None:
@@ -60,10 +52,7 @@ class Pulse:
     def begin(self, time: float) -> None:
         """Start a run: find the shortest pulse that the body answers.
 
-        Raises
-        ------
-        ComponentError
-            It answers none, or has another mass than the given one.
+        ComponentError: it answers none, or has another mass than the given one.
         """
         self._size, answers = 0.0, []
         self.mass = self.given or UNKNOWN_MASS
@@ -81,13 +70,7 @@ class Pulse:
         self.ready = True
 
     def measure(self, time: float) -> None:
-        """Measure the mass at an impact.
-
-        Raises
-        ------
-        ComponentError
-            Pulses of two sizes do not find the same.
-        """
+        """Measure the mass at an impact; ComponentError where pulses of two sizes do not find the same."""
         one, two = self._answers(time)
         if not _is_impulse(one, two):
             raise self._no_impulse(time, one, two)
@@ -124,13 +107,7 @@ class Pulse:
     # ---- a step ----
 
     def start(self, time: float, size: float) -> None:
-        """Hold the force over the next step, of `size` s, that gives the body what it is owed.
-
-        Raises
-        ------
-        ComponentError
-            No force does.
-        """
+        """Hold the force over the next step, of `size` s, that gives the body what it is owed; none: ComponentError."""
         self._size = size
         self._input.parts[PART] = 0.0
         self._input.parts[PART] = self._force(time, size)
