@@ -27,18 +27,12 @@ FEWEST_QUIET = 100
 
 @dataclass(frozen=True, slots=True)
 class LagSlopes:
-    """What a lag does to the residual of its channel.
-
-    Attributes
-    ----------
-    slope : ndarray, shape (sample,)
-        Derivative of the residual by the lag, 1/s.
-    weight : ndarray, shape (sample,)
-        w of the equation that the lag solves; 0 outside the start of the event.
-    """
+    """What a lag does to the residual of its channel."""
 
     slope: Floats
+    """Derivative of the residual by the lag, 1/s, shape (sample,)."""
     weight: Floats
+    """w of the equation that the lag solves, shape (sample,); 0 outside the start of the event."""
 
 
 def lag_slopes(comparison: Comparison, model: Interpolated, size: float) -> LagSlopes | None:
@@ -66,16 +60,9 @@ def covariance_of(
 ) -> Floats:
     """Return the covariance of the numbers, shape (key, key).
 
-    Parameters
-    ----------
-    slopes : sequence of ndarray, shape (sample, key)
-        Of the residual of each channel by each number.
-    lags : sequence of LagSlopes or None
-    residuals : sequence of ndarray, shape (sample,)
-        Correlated in time.
-    disturbances : sequence of sequences of ndarray, shape (sample,)
-        Draws of what noise of the drives does to the residuals of all channels: its response rings for longer than
-        any estimate from one record's residual can see.
+    Slopes of the residual of each channel have shape (sample, key); residuals are correlated in time. Disturbances are
+    draws of what noise of the drives does to the residuals of all channels: its response rings for longer than any
+    estimate from one record's residual can see.
     """
     keys, found = slopes[0].shape[1], [place for place, lag in enumerate(lags) if lag is not None]
     derivatives, weights = [], []

@@ -25,27 +25,18 @@ VOLTS = "V"
 
 @dataclass(frozen=True, slots=True)
 class DriveSignal:
-    """What drives a body.
-
-    Attributes
-    ----------
-    time : ndarray, shape (sample,)
-        s, on the clock of its channel.
-    values : ndarray, shape (sample,)
-        m/s^2 or N, V of an exciter; offset taken off, gaps bridged by straight lines.
-    bridged : ndarray of bool, shape (sample,)
-        Where a gap was bridged: what follows from it is a guess.
-    offset : float
-        What was taken off, in the unit of the channel.
-    remarks : tuple of str
-        What a reader must know.
-    """
+    """What drives a body."""
 
     time: Floats
+    """s, on the clock of its channel, shape (sample,)."""
     values: Floats
+    """m/s^2 or N, V of an exciter; offset taken off, gaps bridged by straight lines."""
     bridged: NDArray[np.bool_]
+    """Where a gap was bridged: what follows from it is a guess."""
     offset: float
+    """What was taken off, in the unit of the channel."""
     remarks: tuple[str, ...]
+    """What a reader must know."""
 
 
 def drive_of(
@@ -56,24 +47,11 @@ def drive_of(
     *,
     designed: bool = False,
 ) -> DriveSignal:
-    """Return what a channel drives a body with.
+    """Return what a channel drives a body with, `base_acceleration` or `force`.
 
-    Parameters
-    ----------
-    channel : Channel
-    drive : str
-        `base_acceleration` or `force`.
-    offset : float or None
-        Taken off every sample, in the unit of the channel; None for `quiet_level`.
-    expected : str
-        SI unit that the channel must have; that of the drive where it is empty.
-    designed : bool
-        Whether the channel was computed, not measured: without an offset that is given, its mean is kept.
-
-    Raises
-    ------
-    DatasetError
-        The channel measures something else, or has less than two samples.
+    The offset, in the unit of the channel, is taken off every sample (None: `quiet_level`). The expected SI unit is
+    that of the drive where it is empty. A designed channel was computed, not measured: without an offset that is given,
+    its mean is kept. A channel of something else, or of less than two samples, raises DatasetError.
     """
     expected, unit = expected or DRIVEN_UNITS[drive], measured_unit(channel.unit)
     if unit.si not in (expected, "1"):
@@ -122,12 +100,10 @@ def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list
 def quiet_level(values: Floats) -> float:
     """Return the level of a signal where nothing happens: the median of its quietest part.
 
-    The signal is cut into `QUIET_PARTS` equal parts; the quietest has the least median distance from its median.
-    A signal that never rests (of a shaker) has the middle of its whole instead: its quietest part is no quieter
-    than a third of all of it.
+    The signal is cut into `QUIET_PARTS` equal parts; the quietest has the least median distance from its median. A
+    signal that never rests (of a shaker) has the middle of its whole instead: its quietest part is no quieter than a
+    third of all of it.
 
-    Examples
-    --------
     >>> pulse = 0.25 + np.exp(-(((np.arange(1000) - 300) / 40.0) ** 2))
     >>> round(quiet_level(pulse), 9)
     0.25
@@ -142,24 +118,12 @@ def quiet_level(values: Floats) -> float:
 
 
 def step_instants(signal_time: Floats, finest: float, end: float) -> Floats:
-    """Return the instants to step through: every sample of the drive, with steps no longer than `finest`.
+    """Return the instants to step through: every sample of the drive, with steps no longer than `finest` (s).
 
-    Parameters
-    ----------
-    signal_time : ndarray, shape (sample,)
-        Instants of the drive's samples, s: its slope changes there.
-    finest : float
-        Longest step, s, for motion that is compared with a faster channel.
-    end : float
-        Where to stop, s; beyond the last sample the steps are `finest` or the drive's last, whichever is shorter.
+    The slope changes at the drive's samples; `finest` is for motion that is compared with a faster channel. Beyond the
+    last sample the steps to the end (s) are `finest` or the drive's last, whichever is shorter. More than `MOST_STEPS`,
+    of clocks that are far apart or a hole of hours, raise DatasetError.
 
-    Raises
-    ------
-    DatasetError
-        There would be more than `MOST_STEPS`: clocks that are far apart, or a hole of hours.
-
-    Examples
-    --------
     >>> step_instants(np.array([0.0, 1.0, 3.0]), 1.0, 4.0).tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """

@@ -88,10 +88,7 @@ class ReplayFit:
 def fit_keys(scene: Scene, text: str) -> tuple[str, ...]:
     """Return the keys of `--fit body.damping_ratio,sensor.gain`.
 
-    Raises
-    ------
-    UsageError
-        A key is no number of the scene, or is there twice.
+    A key that is no number of the scene, or is there twice, raises UsageError.
     """
     keys = tuple(key.strip() for key in text.split(",") if key.strip())
     if not keys or len(set(keys)) < len(keys):

@@ -32,21 +32,13 @@ _HEADING = re.compile(rf"\A{_HEAD} .*\n(?:# [^\n]* \+- .*\n)*\n?")
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """One recording, replayed.
-
-    Attributes
-    ----------
-    replayer : Replayer
-    motion : Motion
-    comparisons : list of Comparison
-    use : str
-        `fitted`, `scored` (not fitted on), or `replayed` (nothing was fitted).
-    """
+    """One recording, replayed."""
 
     replayer: Replayer
     motion: Motion
     comparisons: list[Comparison]
     use: str
+    """`fitted`, `scored` (not fitted on), or `replayed` (nothing was fitted)."""
 
     @property
     def name(self) -> str:
@@ -59,15 +51,9 @@ def replay_dataset(
 ) -> xr.Dataset:
     """Return the dataset of replays of one scene, ready for `write_results(kind="replay")`.
 
-    Signals and scores are those of `comparison_dataset`, of all recordings one after the other; `recording` and
-    `use` say which. `drive_K` on `drive_time_K` and `simulated_impact_K` belong to recording K (from 1). Fitted
-    numbers are on `parameter`.
-
-    Parameters
-    ----------
-    replays : sequence of Replayed
-        At least one, each with something compared or a drive.
-    fit, verdict : optional
+    Signals and scores are those of `comparison_dataset`, of all recordings one after the other; `recording` and `use`
+    say which. `drive_K` on `drive_time_K` and `simulated_impact_K` belong to recording K (from 1). Fitted numbers are
+    on `parameter`. At least one replay is given, each with something compared or a drive.
     """
     compared = [comparison for replay in replays for comparison in replay.comparisons]
     dataset = comparison_dataset(compared) if compared else xr.Dataset()

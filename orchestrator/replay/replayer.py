@@ -41,26 +41,17 @@ REPLAY, DRIVE = "replay", "drive"
 
 @dataclass(frozen=True, slots=True)
 class ChannelReading:
-    """How a simulated variable becomes what a channel reads, in the SI unit of the channel.
-
-    Attributes
-    ----------
-    compared : Compared
-    variable : str
-        As a time series names it.
-    channel : Channel
-        What measured it.
-    is_sensor : bool
-        Whether `[sensor]` makes the reading: gain * value + offset.
-    same_kind : bool
-        Whether the variable and the channel measure the same kind, so that the gain is a pure number.
-    """
+    """How a simulated variable becomes what a channel reads, in the SI unit of the channel."""
 
     compared: Compared
     variable: str
+    """As a time series names it."""
     channel: Channel
+    """What measured it."""
     is_sensor: bool
+    """Whether `[sensor]` makes the reading: gain * value + offset."""
     same_kind: bool
+    """Whether variable and channel measure the same kind, so that the gain is a pure number."""
 
     def of(self, values: Floats, scene: Scene) -> Floats:
         """Return readings of SI values of the variable, shape (sample,)."""
@@ -262,13 +253,7 @@ class Replayer:
 
 
 def replay_table(scene: Scene) -> Replay:
-    """Return the `[replay]` of a scene.
-
-    Raises
-    ------
-    SceneError
-        It has none.
-    """
+    """Return the `[replay]` of a scene; raise SceneError if it has none."""
     if scene.replay is None:
         raise SceneError(
             [f"{scene.source}: replay: expected a [replay] table, got none. Add drive, from and compare."]

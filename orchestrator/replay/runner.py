@@ -31,19 +31,8 @@ from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 class ReplayRunner(Runner):
     """Runs the replays of one scene; each recording is opened once in a process.
 
-    Parameters
-    ----------
-    scene : Scene
-        With `[replay]` and at least one recording in it.
-    execution : str
-        `auto`, `fused` or `coupled`.
-
-    Attributes
-    ----------
-    execution, engine, instruction_set
-        As of `run.runner.Runner`.
-    fmu_hashes : dict of str to str
-        SHA-256 of each component's FMU and of each recording: a campaign never mixes two versions of either.
+    `fmu_hashes` have the SHA-256 of each component's FMU and of each recording: a campaign never mixes two versions of
+    either.
     """
 
     engine = ENGINE
@@ -71,10 +60,7 @@ class ReplayRunner(Runner):
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Replay one recording with the values of one point.
 
-        Raises
-        ------
-        VibroimpactError
-            The recording cannot be read or compared, or the body refuses its parameters.
+        VibroimpactError: the recording cannot be read or compared, or the body refuses its parameters.
         """
         began = time.perf_counter()
         numbers = {key: value for key, value in values.items() if key != RECORDING_KEY}

@@ -34,14 +34,7 @@ _DRIVE = re.compile(r"[A-Za-z]:")
 class SspArchive:
     """An archive whose members are safe to read.
 
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    ComponentFileError
-        It is missing, no zip, unsafe, or has no `SystemStructure.ssd`.
+    A file that is missing, no zip, unsafe, or without `SystemStructure.ssd` raises ComponentFileError.
     """
 
     def __init__(self, path: Path) -> None:
@@ -64,23 +57,14 @@ class SspArchive:
     def xml(self, member: str) -> Element:
         """Return the root of an XML member.
 
-        Raises
-        ------
-        ComponentFileError
-            It is too large, damaged, not well-formed, or declares entities.
+        A member that is too large, damaged, not well-formed, or declares entities raises ComponentFileError.
         """
         info = self._members[member]
         refuse_large(info.file_size, f"{self.path}: {member}")
         return root_of(self._content(info), f"{self.path}: {member}", namespaces=True)
 
     def member(self, uri: str, where: str) -> str:
-        """Return the member that a `source` names.
-
-        Raises
-        ------
-        RefusalError
-            It leads out of the archive, or there is no such member.
-        """
+        """Return the member that a `source` names; RefusalError where it leads out of the archive, or there is none."""
         try:
             parts = urlsplit(uri)
         except ValueError:  # brackets of no address
@@ -100,15 +84,7 @@ class SspArchive:
         return member
 
     def copy(self, member: str, target: Path) -> None:
-        """Write a member to a file.
-
-        Raises
-        ------
-        ComponentFileError
-            It is damaged.
-        OSError
-            The file cannot be written.
-        """
+        """Write a member to a file; a damaged one raises ComponentFileError, one that cannot be written OSError."""
         with target.open("xb") as file:
             try:
                 with self._zip.open(self._members[member]) as source:

@@ -46,29 +46,9 @@ class _Edge:
 
 
 class FlatSystem:
-    """A system without the systems in it.
+    """A system without the systems in it, and without the gains, components that are gains of connections.
 
-    Parameters
-    ----------
-    system : System
-    facts : mapping of Path to ComponentFacts
-        Of each component.
-    gains : collection of Path
-        Components that are gains of connections.
-
-    Attributes
-    ----------
-    components : dict of Path to Component
-        In the order of the file; without the gains.
-    ignored : list of str
-        Parameters that no variable takes, and names of mappings that no parameter has: SSP wants them left out.
-    overruled : list of str
-        Parameters that a connection gives another value than a parameter set of their own: the connection's is taken.
-
-    Raises
-    ------
-    RefusalError
-        A connection leads from or to nothing, or cannot be a gain.
+    A connection that leads from or to nothing, or cannot be a gain, raises RefusalError.
     """
 
     def __init__(
@@ -76,8 +56,11 @@ class FlatSystem:
     ) -> None:
         self._all = dict(components_of(system))
         self.components = {path: one for path, one in self._all.items() if path not in gains}
+        """In the order of the file."""
         self.ignored: list[str] = []
+        """Parameters that no variable takes, and names of mappings that no parameter has: SSP wants them left out."""
         self.overruled: list[str] = []
+        """Parameters that a connection gives another value than a set of their own: the connection's is taken."""
         self._facts = facts
         self._systems = dict(_systems(system, ()))
         self._edges: dict[Node, _Edge] = {}

@@ -47,18 +47,12 @@ _scratch: list[ScratchFolder] = []
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """A system as a scene.
-
-    Attributes
-    ----------
-    scene : Scene
-        Its FMUs lie in a folder that goes at the end of the process.
-    notes : tuple of str
-        What was chosen where the system does not say it.
-    """
+    """A system as a scene."""
 
     scene: Scene
+    """Its FMUs lie in a folder that goes at the end of the process."""
     notes: tuple[str, ...]
+    """What was chosen where the system does not say it."""
 
 
 def load_system(

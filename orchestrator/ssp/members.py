@@ -29,34 +29,23 @@ for an algebraic loop at the start; with a component of FMI 2.0 in it, it solves
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A component in the archive.
-
-    Attributes
-    ----------
-    name : str
-        Its name in the scene.
-    member : str
-        Its FMU's.
-    content : bytes
-        The FMU.
-    facts : ComponentFacts
-        What the FMU in the archive says of itself.
-    values : mapping of str to number, bool or str
-        Start values.
-    fmu, fmi : str
-        The component of this package that it is, and the version that the scene runs; empty for any other.
-    gain_of : ConnectionSpec or None
-        The connection whose gain it is.
-    """
+    """A component in the archive."""
 
     name: str
+    """Its name in the scene."""
     member: str
+    """Its FMU's."""
     content: bytes
+    """The FMU."""
     facts: ComponentFacts
+    """What the FMU in the archive says of itself."""
     values: Mapping[str, StartValue]
+    """Start values."""
     fmu: str = ""
     fmi: str = ""
+    """`fmu` and `fmi`: component of this package, and version that the scene runs; empty for any other."""
     gain_of: ConnectionSpec | None = None
+    """The connection whose gain it is."""
 
     @property
     def values_member(self) -> str:
@@ -66,26 +55,16 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """How components travel.
-
-    Attributes
-    ----------
-    folder : Path
-        Where FMUs may be written.
-    fmi : str or None
-        Version of this package's own; None: as the scene has it.
-    stop_time : float
-        When a run of them ends, s.
-    gains : bool
-        Whether gains are components of their own.
-    platform, note
-        As `vibroimpact.fmus.export` has them.
-    """
+    """How components travel; platform and note are those of `vibroimpact.fmus.export`."""
 
     folder: Path
+    """Where FMUs may be written."""
     fmi: str | None
+    """Version of this package's own; None: as the scene has it."""
     stop_time: float
+    """When a run of them ends, s."""
     gains: bool = False
+    """Whether gains are components of their own."""
     platform: str | None = None
     note: Note = lambda _: None
 

@@ -45,8 +45,6 @@ INTEGER_TYPES = frozenset(
 def tag(name: str) -> str:
     """Return the name of an element as the parser gives it.
 
-    Examples
-    --------
     >>> tag("ssd:System")
     '{http://ssp-standard.org/SSP1/SystemStructureDescription}System'
     """

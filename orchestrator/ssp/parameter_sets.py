@@ -44,10 +44,7 @@ def with_sets(
 ) -> None:
     """Put parameter sets into the tables of a scene: one as start values, several as its sweep.
 
-    Raises
-    ------
-    UsageError
-        A set has no parameter of the system, or several sets are not the points of a grid.
+    UsageError: a set has no parameter of the system, or several sets are not the points of a grid.
     """
     names = names_of(list(flat.components))
     points = [_point(name, parameters, flat, facts, names) for name, parameters in sets.items()]

@@ -44,12 +44,8 @@ DEEPEST = 50
 def read_structure(archive: SspArchive) -> Structure:
     """Read the default SSD of an archive.
 
-    Raises
-    ------
-    RefusalError
-        It is no SSD, or has what this package cannot run.
-    ComponentFileError
-        An XML file is damaged or unsafe.
+    RefusalError: it is no SSD, or has what this package cannot run. ComponentFileError: an XML file is damaged or
+    unsafe.
     """
     root = archive.xml(SSD_FILE)
     expect(root, "ssd:SystemStructureDescription", SSD_FILE)

@@ -8,13 +8,7 @@ from vibroimpact.orchestrator.scene.problems import Problem
 
 
 class RefusalError(Exception):
-    """One thing that is wrong with a system.
-
-    Attributes
-    ----------
-    problem : Problem
-        Where, what is expected, what is there, what to do.
-    """
+    """One `problem` of a system: where it is, what is expected, what is there, what to do."""
 
     def __init__(self, where: str, expected: str, got: str, hint: str | Callable[[], str] = "") -> None:
         self.problem = Problem(where, expected, got, hint)

@@ -25,8 +25,6 @@ _NOT_OF_A_NAME = re.compile(r"[^A-Za-z0-9_]")
 def names_of(paths: Sequence[Path]) -> dict[Path, str]:
     """Return a name for each component that a scene takes.
 
-    Examples
-    --------
     >>> names_of([("rig", "body"), ("stop 1",), ("rig_body",)])
     {('rig', 'body'): 'rig_body', ('stop 1',): 'stop_1', ('rig_body',): 'rig_body_2'}
     """
@@ -61,16 +59,7 @@ def scene_tables(
     fmus: Mapping[Path, tuple[str, str | None]],
     facts: Mapping[Path, ComponentFacts],
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the tables of a scene, and notes for a person.
-
-    Parameters
-    ----------
-    structure : Structure
-    flat : FlatSystem
-    fmus : mapping of Path to tuple of str and str or None
-        What a scene has for `fmu` and `fmi` of each component.
-    facts : mapping of Path to ComponentFacts
-    """
+    """Return the tables of a scene, and notes for a person; `fmus` has a scene's `fmu` and `fmi` of each component."""
     names, values = names_of(list(flat.components)), flat.start_values()
     noted = noted_tables(structure)
     notes: list[str] = []

@@ -11,43 +11,29 @@ from vibroimpact.orchestrator.ssp.values import Binding
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """A connector of a component or of a system.
-
-    Attributes
-    ----------
-    kind : str
-        `input`, `output`, `parameter`, ...
-    unit : Unit or None
-        None where the SSD does not say.
-    """
+    """A connector of a component or of a system."""
 
     name: str
     kind: str
+    """`input`, `output`, `parameter`, ..."""
     unit: Unit | None = None
+    """None where the SSD does not say."""
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A connection; which end gives the value follows from the kinds of its connectors.
-
-    Attributes
-    ----------
-    start, end : tuple of (str or None, str)
-        Element and connector; None for a connector of the system itself.
-    factor, offset : float or None
-        Its linear transformation, None where there is none.
-    suppressed : bool
-        Whether units are not converted.
-    gain_unit : str or None
-        The unit of its gain, as this package has noted it.
-    """
+    """A connection; which end gives the value follows from the kinds of its connectors."""
 
     start: tuple[str | None, str]
     end: tuple[str | None, str]
+    """`start` and `end`: element (None: the system itself) and connector."""
     factor: float | None = None
+    """Of its linear transformation, as the offset; None where there is none."""
     offset: float = 0.0
     suppressed: bool = False
+    """Whether units are not converted."""
     gain_unit: str | None = None
+    """The unit of its gain, as this package has noted it."""
 
     @property
     def where(self) -> str:
@@ -58,28 +44,20 @@ class Connection:
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """An FMU.
-
-    Attributes
-    ----------
-    source : str
-        The member of the archive.
-    fmu, fmi : str
-        The component of this package that it was exported of, and its version of FMI; empty for any other.
-    is_gain : bool
-        Whether it stands for the gain of a connection.
-    gain_unit : str or None
-        The unit of that gain, where the scene has one.
-    """
+    """An FMU."""
 
     name: str
     source: str
+    """The member of the archive."""
     connectors: Mapping[str, Connector]
     bindings: tuple[Binding, ...] = ()
     fmu: str = ""
     fmi: str = ""
+    """`fmu` and `fmi`: component of this package that it was exported of, and version; empty for any other."""
     is_gain: bool = False
+    """Whether it stands for the gain of a connection."""
     gain_unit: str | None = None
+    """The unit of that gain, where the scene has one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,21 +73,14 @@ class System:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """All that an SSD says.
-
-    Attributes
-    ----------
-    start_time, stop_time : float or None
-        Of its default experiment, s.
-    step : float or None
-        Step of its master, s, where an annotation says it.
-    tables : str
-        TOML text of the tables of a scene that SSP has no words for, as this package has noted them; may be empty.
-    """
+    """All that an SSD says."""
 
     name: str
     system: System
     start_time: float | None = None
     stop_time: float | None = None
+    """`start_time` and `stop_time` of its default experiment, s."""
     step: float | None = None
+    """Step of its master, s, where an annotation says it."""
     tables: str = ""
+    """TOML of the tables of a scene without words in SSP, as this package has noted them; may be empty."""

@@ -56,23 +56,15 @@ class Mapped:
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """Parameters of an element by the names that they have there.
-
-    Attributes
-    ----------
-    parameters : tuple of Parameter
-    mapping : tuple of Mapped or None
-        How they were renamed; None where they were not.
-    prefix : str
-        What their names had before that.
-    unmatched : tuple of str
-        Parameters that the mapping names, and that are not there.
-    """
+    """Parameters of an element by the names that they have there."""
 
     parameters: tuple[Parameter, ...]
     mapping: tuple[Mapped, ...] | None = None
+    """How they were renamed; None where they were not."""
     prefix: str = ""
+    """What their names had before that."""
     unmatched: tuple[str, ...] = ()
+    """Parameters that the mapping names, and that are not there."""
 
     def renamed(self, parameter: Parameter) -> tuple[Parameter, ...]:
         """Return what its mapping makes of a parameter of another set; nothing where it does not name it."""
@@ -122,17 +114,7 @@ def _unit(element: Element, where: str) -> tuple[str, Unit]:
 
 
 def read_parameter_set(root: Element, where: str, units: Units | None = None) -> tuple[Parameter, ...]:
-    """Return the parameters of a parameter set.
-
-    Parameters
-    ----------
-    root : Element
-        `ssv:ParameterSet`.
-    where : str
-        What messages begin with.
-    units : mapping of str to Unit, optional
-        Those of the file around it.
-    """
+    """Return the parameters of `ssv:ParameterSet`, in units of the file around it; messages begin with `where`."""
     expect(root, "ssv:ParameterSet", where)
     refuse_version(root, where)
     known = {**(units or {}), **read_units(root, where)}
@@ -198,10 +180,7 @@ def read_transformation(element: Element, where: str) -> tuple[float, float] | N
 def start_value(variable: VariableFacts, parameter: Parameter, where: str) -> StartValue:
     """Return the value of a parameter as its variable takes it, in its unit.
 
-    Raises
-    ------
-    RefusalError
-        It is of another type, or out of range.
+    Another type, or a value out of range, raises RefusalError.
     """
     value = parameter.value
     if variable.kind == "real" and not isinstance(value, bool | str):

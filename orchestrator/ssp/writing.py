@@ -52,10 +52,7 @@ def description(
 ) -> bytes:
     """Return the SSD of a scene.
 
-    Raises
-    ------
-    UsageError
-        A connection comes from what this version of SSP has no word for.
+    A connection from what this version of SSP has no word for raises UsageError.
     """
     root = _root("ssd:SystemStructureDescription", ssp, ("ssc", "ssv", "ssm", "osp", "oms", "vibroimpact"))
     # OMSimulator makes a model of this name
