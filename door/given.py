@@ -18,13 +18,7 @@ PathLike = str | os.PathLike[str]
 
 
 def given_scene(given: SceneLike, *, for_orbits: bool = False) -> Scene:
-    """Return the scene that a caller means; for orbits a start that is not written may be on a stop.
-
-    Raises
-    ------
-    UsageError
-        It is none.
-    """
+    """Return the scene that a caller means, else UsageError; for orbits an unwritten start may be on a stop."""
     if isinstance(given, Scene):
         return given
     if isinstance(given, Mapping):
@@ -67,13 +61,7 @@ def scene_with_modes(given: SceneLike) -> Scene:
 
 
 def given_path(given: object) -> Path:
-    """Return the file or folder that a caller names.
-
-    Raises
-    ------
-    UsageError
-        It is no name.
-    """
+    """Return the file or folder that a caller names; raise UsageError for anything else."""
     if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
         raise UsageError(f"path: expected the name of a file or folder, got {given!r}.")
     return Path(given)
@@ -82,16 +70,8 @@ def given_path(given: object) -> Path:
 def given_output(given: object, read: Iterable[object]) -> Path:
     """Return the file that a caller wants to be written; it is looked at before anything runs.
 
-    Parameters
-    ----------
-    given : path
-    read : iterable
-        What else the caller gives. Files among it, and those of scenes, are read, and are not written over.
-
-    Raises
-    ------
-    UsageError
-        It is no name, or one of a file that is read, or nothing can be written there.
+    Files among what else the caller gives (`read`), and those of scenes, are not written over: UsageError, as for no
+    name, or where nothing can be written.
     """
     path = given_path(given)
     files: list[Path] = []

@@ -42,12 +42,8 @@ class _Ruleset(ctypes.Structure):
 def confine(seconds: float, memory: int) -> None:
     """Let the system end this process after a processor time, and refuse it more memory, writing and network.
 
-    Parameters
-    ----------
-    seconds : float
-        Processor time, s; of wall time it gets `PATIENCE` times as much.
-    memory : int
-        Memory beyond what it has now, bytes; never more than the machine has.
+    Of wall time (s) it gets `PATIENCE` times as much. Memory is counted in bytes beyond what it has now, never more
+    than the machine has.
     """
     import resource
 

@@ -39,16 +39,9 @@ def import_libraries(order: Mapping[str, Any]) -> None:
 
 
 def read_in_limits(order: Mapping[str, Any], parent: int, answers: int, begins: int | None = None) -> None:
-    """Read a file within limits, and answer; this process is a fork that does nothing else.
+    """Read a file, by an `Order` as a mapping, within limits, and answer; this process is a fork that does no more.
 
-    Parameters
-    ----------
-    order : mapping
-        Of an `Order`.
-    parent : int
-        The process that made this one, with which it ends.
-    answers, begins : int
-        Descriptors: of the answer, and of a byte that says that it begins.
+    It ends with its parent. The descriptors are of the answer, and of a byte that says that it begins.
     """
     end_with_parent(parent)
     confine(order["seconds"], order["memory"])

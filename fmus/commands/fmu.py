@@ -55,10 +55,7 @@ def build_into(options: BuildFmus) -> None:
 def check_all(options: CheckFmus) -> None:
     """Check FMUs, all of the package if none is named: refusals are raised, doubts and remarks are said.
 
-    Raises
-    ------
-    ComponentFileError
-        An FMU will not run; with `strict`, also one that may run wrong.
+    An FMU that will not run, with `strict` also one that may run wrong, raises ComponentFileError.
     """
     # loads fmpy, which an export needs not
     from vibroimpact.fmus.packaging.check import check_fmu, kinds_of

@@ -299,10 +299,7 @@ def refuse_broken_description(fmu: UnpackedFmu, seconds: float) -> None:
 def _read_apart(path: Path, folder: Path, seconds: float) -> str:
     """Let a process of its own read the XML of an FMU; return which of FMI's rules it breaks.
 
-    Raises
-    ------
-    ComponentFileError
-        The XML cannot be read within the limits.
+    XML that cannot be read within the limits raises ComponentFileError.
     """
     answer = read_apart(Order(_READER, os.path.abspath(folder), {"where": str(path)}, seconds, XML_MEMORY))
     if answer.error == ComponentFileError.__name__:

@@ -89,10 +89,7 @@ def build(output: Path = BUILT, *, native: Path = NATIVE, strict: bool = True) -
 def build_platforms(output: Path, *, native: Path = NATIVE) -> tuple[Path, ...]:
     """Compile the libraries of all components for every platform, into `PLATFORMS_FOLDER`; takes minutes.
 
-    Raises
-    ------
-    ComponentError
-        The ziglang package is not there, or found an error.
+    Without the ziglang package, or where it finds an error, ComponentError is raised.
     """
 
     def compiled(pair: tuple[ComponentDescription, Platform]) -> Path:
@@ -170,10 +167,7 @@ def compile_component(
 ) -> bytes:
     """Return a component's shared library, for this machine or another platform.
 
-    Raises
-    ------
-    ComponentError
-        No compiler works, or one found an error.
+    ComponentError: no compiler works, or one found an error.
     """
     core, folders = native / "core", beside_core(component, native)
     sources = [path for path in _c_files(core) if is_part(component, path.relative_to(core))]

@@ -31,12 +31,8 @@ ACROSS_FILES = ("-O3", "-flto=auto")
 def find_compiler() -> tuple[str, ...]:
     """Return the command of the first C compiler that works.
 
-    Tried in order: `$VIBROIMPACT_CC`, `$CC`, cc, gcc, clang, and the ziglang package.
-
-    Raises
-    ------
-    ComponentError
-        None works, or the one that `$VIBROIMPACT_CC` names does not.
+    Tried in order: `$VIBROIMPACT_CC`, `$CC`, cc, gcc, clang, and the ziglang package. ComponentError: none works, or
+    the one that `$VIBROIMPACT_CC` names does not.
     """
     for command in _candidates():
         if _works(command):
@@ -66,29 +62,12 @@ def compile_library(
     strict: bool = True,
     platform: Platform | None = None,
 ) -> None:
-    """Compile C files into one shared library.
+    """Compile C files, with the folders of their headers, into one shared library, the target.
 
-    Parameters
-    ----------
-    target : Path
-        The library to write.
-    sources, include : sequence of Path
-        The C files and the folders of their headers.
-    definitions : mapping of str to int
-        Macros and their values.
-    export_all : bool
-        Export every function, not only those marked for export.
-    across_files : bool
-        Optimize across files where compiler and linker can; takes half as long again.
-    strict : bool
-        Warnings are errors; off where users build, since a newer compiler may know new warnings.
-    platform : Platform, optional
-        Another machine than this one, compiled for by the ziglang package.
-
-    Raises
-    ------
-    ComponentError
-        With the compiler's own words.
+    Definitions are macros and their values. `export_all` exports every function, not only those marked for it.
+    `across_files` optimizes across files where compiler and linker can; it takes half as long again. Strictly, warnings
+    are errors; not so where users build, since a newer compiler may know new warnings. The ziglang package compiles for
+    another platform. ComponentError has the compiler's own words.
     """
     compiler = find_compiler() if platform is None else zig_compiler()
     options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler, platform)]
@@ -108,13 +87,7 @@ def compile_library(
 
 
 def zig_compiler() -> tuple[str, ...]:
-    """Return the command of the compiler that makes libraries for other machines.
-
-    Raises
-    ------
-    ComponentError
-        The package ziglang is not installed.
-    """
+    """Return the command of the compiler for other machines; ComponentError if the package ziglang is not installed."""
     if not importlib.util.find_spec("ziglang"):
         raise ComponentError(
             "compiler: expected the package ziglang to compile for another machine, got none. "

@@ -21,10 +21,7 @@ Note = Callable[[str], None]
 def chosen_platforms(names: str) -> tuple[Platform, ...]:
     """Return the platforms that `all`, or names with commas between them, stand for.
 
-    Raises
-    ------
-    UsageError
-        A name that FMI has not, or for which nothing can be made.
+    A name that FMI has not, or for which nothing can be made, raises UsageError.
     """
     wanted = list(TARGETS) if names.strip() == "all" else [name.strip() for name in names.split(",")]
     unknown = [name for name in wanted if name not in TARGETS]
@@ -34,20 +31,10 @@ def chosen_platforms(names: str) -> tuple[Platform, ...]:
 
 
 def library_for(component: ComponentDescription, platform: Platform, note: Note = lambda _: None) -> bytes:
-    """Return a component's library for a platform.
+    """Return a component's library for a platform; the component is as it is compiled in, not one of an export.
 
-    Parameters
-    ----------
-    component : ComponentDescription
-        As it is compiled in, not one of an export.
-    platform : Platform
-    note : callable
-        Told what is compiled, which takes from seconds to, the first time for Windows, minutes.
-
-    Raises
-    ------
-    ComponentError
-        It is not there and cannot be compiled.
+    `note` is told what is compiled, which takes from seconds to, the first time for Windows, minutes. What is not there
+    and cannot be compiled raises ComponentError.
     """
     name = f"{component.name}{platform.suffix}"
     shipped = SHIPPED / platform.name / name
@@ -68,17 +55,9 @@ def library_for(component: ComponentDescription, platform: Platform, note: Note 
 def members_for(
     components_library: Callable[[Platform], bytes], name: str, platforms: Iterable[Platform], fmi: str
 ) -> dict[str, bytes]:
-    """Return the members of an FMU that hold its binaries.
+    """Return the members of an FMU that hold its binaries, named by the model identifier.
 
-    Parameters
-    ----------
-    components_library : callable
-        Returns the library for a platform.
-    name : str
-        The model identifier.
-    platforms : iterable of Platform
-    fmi : str
-        `3.0` or `2.0`, which has one folder for both processors of macOS: there the file holds both.
+    FMI `2.0` has one folder for both processors of macOS: there the file holds both; `3.0` has two.
     """
     members: dict[str, dict[Platform, bytes]] = {}
     for platform in platforms:

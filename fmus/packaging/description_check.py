@@ -14,16 +14,9 @@ from vibroimpact.fmus.safe_xml import root_of
 def read(path: str, options: dict[str, Any]) -> tuple[str, tuple[()]]:
     """Parse the XML of an unpacked FMU; messages begin with the option `where`.
 
-    Returns
-    -------
-    str
-        Which of FMI's rules the description breaks where there is no way round; empty where none. It is told where the
-        description is used.
-
-    Raises
-    ------
-    ComponentFileError
-        It is not well-formed, or declares a document type or an entity.
+    The text returned says which of FMI's rules the description breaks where there is no way round, and is told where
+    the description is used. XML that is not well-formed, or declares a document type or an entity, raises
+    ComponentFileError.
     """
     for name in PARSED_XML:
         file = Path(path, name)

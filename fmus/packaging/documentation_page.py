@@ -37,21 +37,10 @@ def page(
     icon: str,
     further: Sequence[tuple[str, str]],
 ) -> str:
-    """Return the text of the page.
+    """Return the text of the page of a component as it is described.
 
-    Parameters
-    ----------
-    component : ComponentDescription
-        As it is described.
-    readme : str
-        Its README.
-    equations : str
-        Its equations in HTML and MathML.
-    edition : Edition
-    icon : str
-        Where the icon is, from the page; empty where there is none.
-    further : sequence of (str, str)
-        Other files of the FMU: where they are, from the page, and what they are.
+    Equations are HTML and MathML. The icon, none where empty, and further files, with what they are, are named from the
+    page.
     """
     title = escape(component.name)
     picture = f'<img src="{escape(icon)}" alt="">' if icon else ""

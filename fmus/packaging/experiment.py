@@ -25,23 +25,11 @@ Starts = Mapping[str, Number]
 
 
 def default_experiment(component: str, starts: Starts, stop_time: float | None = None) -> Experiment:
-    """Return the default experiment of a body, from its start values.
+    """Return the default experiment of a body, from all its start values by variable name.
 
-    Parameters
-    ----------
-    component : str
-        Name of the component.
-    starts : mapping of str to number
-        All its start values by variable name.
-    stop_time : float, optional
-        When it ends, s.
-
-    Returns
-    -------
-    Experiment
-        `PERIODS` periods of its slowest natural frequency or of its forcing, whichever is slower, and
-        `STEPS_PER_PERIOD` steps in each of the fastest, `MOST_STEPS` at most; both rounded to two digits. FMI's usual
-        ten seconds where the numbers are too large or too small to have periods.
+    It has `PERIODS` periods of its slowest natural frequency or of its forcing, whichever is slower, where no stop time
+    (s) is given. `STEPS_PER_PERIOD` steps are in each of the fastest, `MOST_STEPS` at most; both are rounded to two
+    digits. FMI's usual ten seconds stand where the numbers are too large or too small to have periods.
     """
     try:
         with np.errstate(all="ignore"):

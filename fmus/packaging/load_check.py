@@ -54,11 +54,8 @@ class Fmi2Callbacks(Structure):
 def problems_of(facts: dict[str, Any]) -> list[Found]:
     """Return what is wrong with a binary: the name of a grade, and a line.
 
-    Parameters
-    ----------
-    facts : dict
-        `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder), and `any_token`:
-        the binary is known to take every token.
+    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder), and
+    `any_token`: the binary is known to take every token.
     """
     name = Path(facts["binary"]).name
     try:

@@ -44,47 +44,29 @@ OWN_DIGITS = 12
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What an FMU is made of.
-
-    Attributes
-    ----------
-    original, component : ComponentDescription
-        As it is compiled in, and as it is described.
-    fmi : str
-        `3.0` or `2.0`.
-    edition : Edition or None
-        None: a full description, for this package's own importer.
-    experiment : Experiment
-        The run that is tried, and kept as a reference result.
-    counts : mapping of str to int
-        How many of each repeated block are described, where that is not all.
-    resources : mapping of str to bytes
-        Further members, all below `resources/`.
-    platform : str, optional
-        As in `export_fmu`.
-    note : callable
-        Told what is compiled for another machine, and what the library warns of.
-    """
+    """What an FMU is made of."""
 
     original: ComponentDescription
+    """As it is compiled in; `component` is as it is described."""
     component: ComponentDescription
     fmi: str
+    """`3.0` or `2.0`."""
     edition: Edition | None
+    """None: a full description, for this package's own importer."""
     experiment: Experiment
+    """The run that is tried, and kept as a reference result."""
     counts: Mapping[str, int] = field(default_factory=dict)
+    """How many of each repeated block are described, where that is not all."""
     resources: Mapping[str, bytes] = field(default_factory=dict)
+    """Further members, all below `resources/`."""
     platform: str | None = None
+    """As in `export_fmu`."""
     note: Note = lambda _: None
+    """Told what is compiled for another machine, and what the library warns of."""
 
 
 def component_of(name: str) -> ComponentDescription:
-    """Return a component as it is compiled in, by its name.
-
-    Raises
-    ------
-    ComponentFileError
-        There is no such component.
-    """
+    """Return a component as it is compiled in, by its name; an unknown name raises ComponentFileError."""
     return read_component(component_folder(name) / "variables.toml")
 
 
@@ -99,14 +81,8 @@ def edition_of(experiment: Experiment, *, dated: bool = True) -> Edition:
 def members_of(contents: Contents) -> dict[str, bytes]:
     """Return the members of an FMU.
 
-    Raises
-    ------
-    ComponentFileError
-        The component was not built.
-    ComponentError
-        There is no library for a platform, and nothing to compile it with; or a trial of it ended without an answer.
-    UsageError
-        The library refuses the start values.
+    ComponentFileError: the component was not built. ComponentError: there is no library for a platform, and nothing to
+    compile it with; or a trial of it ended without an answer. UsageError: the library refuses the start values.
     """
     original, fmi = contents.original, contents.fmi
     with zipfile.ZipFile(fmu_path(original.name, fmi)) as archive:

@@ -55,27 +55,18 @@ CONTROLLER_UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class PythonFmu:
-    """What an FMU is made of.
-
-    Attributes
-    ----------
-    script : Path
-        The file with the slave's class, in a folder of its own that may be filled further.
-    extras : tuple of Path
-        Files and folders that go into the resources with it.
-    readme : Path
-        What the FMU's documentation says.
-    units : mapping of str to Unit
-        Units of the variables that have one.
-    blamed : str
-        What messages of a build that fails begin with: the user's file.
-    """
+    """What an FMU is made of."""
 
     script: Path
+    """The file with the slave's class, in a folder of its own that may be filled further."""
     extras: tuple[Path, ...]
+    """Files and folders that go into the resources with it."""
     readme: Path
+    """What the FMU's documentation says."""
     units: Mapping[str, Unit]
+    """Units of the variables that have one."""
     blamed: str
+    """What messages of a build that fails begin with: the user's file."""
 
 
 def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
@@ -151,12 +142,7 @@ def build_orbit_controller(plan: Mapping[str, Any], output: Path | str) -> Path:
 def make_fmu(parts: PythonFmu, output: Path) -> Path:
     """Let pythonfmu make an FMU, complete its description and write it; equal parts give equal bytes.
 
-    Raises
-    ------
-    ComponentFileError
-        The slave cannot be instantiated.
-    UsageError
-        The file cannot be written.
+    ComponentFileError: the slave cannot be instantiated. UsageError: the file cannot be written.
     """
     members = _built(parts)
     members["documentation/README.md"] = parts.readme.read_bytes()

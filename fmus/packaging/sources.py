@@ -19,16 +19,9 @@ SIZES_HEADER = "sizes.h"
 
 
 def source_members(component: ComponentDescription, fmi: str, native: Path = NATIVE) -> dict[str, bytes]:
-    """Return the members below `sources/` of an FMU.
+    """Return the members below `sources/` of an FMU; the adapter of the other version of FMI is left out.
 
-    Parameters
-    ----------
-    component : ComponentDescription
-        As it is compiled in, not one of an export: the value references are places in its table.
-    fmi : str
-        `3.0` or `2.0`; the adapter of the other version is left out.
-    native : Path
-        The C sources.
+    The component is as it is compiled in, not one of an export: the value references are places in its table.
     """
     other = "fmi2" if fmi.startswith("3") else "fmi3"
     core = native / "core"

@@ -35,24 +35,16 @@ LIMIT = 120.0
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A run of an export's library.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The real outputs.
-    rows : sequence of sequence of float
-        At each communication point the time, s, and their values.
-    ended : str
-        Why it ends before its time; empty where it does not.
-    warnings : tuple of str
-        What the library warned of at the start.
-    """
+    """A run of an export's library."""
 
     names: tuple[str, ...]
+    """The real outputs."""
     rows: Sequence[Sequence[float]]
+    """At each communication point the time, s, and their values."""
     ended: str
+    """Why it ends before its time; empty where it does not."""
     warnings: tuple[str, ...]
+    """What the library warned of at the start."""
 
 
 def tried(
@@ -61,25 +53,10 @@ def tried(
     resources: Mapping[str, bytes],
     experiment: Experiment,
 ) -> Trial:
-    """Run a component as it is described; nothing is set but what its resources say.
+    """Run a component as it is described, by this machine's library; nothing is set but what its resources say.
 
-    Parameters
-    ----------
-    component : ComponentDescription
-        As it is described.
-    library : bytes
-        That of this machine.
-    resources : mapping of str to bytes
-        Members below `resources/`.
-    experiment : Experiment
-        When the run starts and stops.
-
-    Raises
-    ------
-    UsageError
-        The library refuses the start values; with its own words.
-    ComponentError
-        Its process ended without an answer.
+    UsageError: the library refuses the start values, with its own words. ComponentError: its process ended without an
+    answer.
     """
     chosen = [v for v in component.variables_of(3) if v.causality == "output" and v.type == "Float64"]
     chosen = [v for v in chosen if v.variability == "continuous" and not v.dimensions]

@@ -21,13 +21,7 @@ class LibraryError(Exception):
 
 
 class Instance:
-    """An instance of FMI 3.0 for co-simulation.
-
-    Parameters
-    ----------
-    facts : dict
-        `library`, `token`, `resources` (a folder), `event_mode`.
-    """
+    """An instance of FMI 3.0 for co-simulation, of `library`, `token`, `resources` (a folder) and `event_mode`."""
 
     def __init__(self, facts: dict[str, Any]) -> None:
         self.messages: list[tuple[int, str]] = []
@@ -90,17 +84,10 @@ class Instance:
 def trial(facts: dict[str, Any]) -> dict[str, Any]:
     """Return what an instance gave.
 
-    Parameters
-    ----------
-    facts : dict
-        What an `Instance` takes; `start` and `stop`, s; `intervals`, how many steps of equal size lie between; and
-        `references`, the value references of real variables.
-
-    Returns
-    -------
-    dict
-        `refusal` (why there is no run, or empty), `ended` (why it ends before the stop time, or empty), `warnings`
-        (what was logged as such), `rows` (at each communication point the time and the values).
+    The facts are what an `Instance` takes; `start` and `stop`, s; `intervals`, how many steps of equal size lie
+    between; and `references`, the value references of real variables. The answer has `refusal` (why there is no run, or
+    empty), `ended` (why it ends before the stop time, or empty), `warnings` (what was logged as such), `rows` (at each
+    communication point the time and the values).
     """
     answer: dict[str, Any] = {"refusal": "", "ended": "", "warnings": [], "rows": []}
     start, stop, intervals = facts["start"], facts["stop"], facts["intervals"]

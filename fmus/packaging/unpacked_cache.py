@@ -123,13 +123,8 @@ def _try_lock(handle: int, *, shared: bool) -> bool | None:
 def sweep(cache: Path, coming: int, abandoned_after: float) -> None:
     """Remove what no living process uses: what killed ones left half unpacked, what is old, and what is too much.
 
-    Parameters
-    ----------
-    cache : Path
-    coming : int
-        Bytes that are about to be unpacked.
-    abandoned_after : float
-        Age, s, above which a folder that is half unpacked and not locked is nobody's.
+    So many bytes are coming, about to be unpacked. A folder that is half unpacked, not locked and older than
+    `abandoned_after` (s) is nobody's.
     """
     now, total, entries = time.time(), coming, []
     known = _known_sizes(cache)

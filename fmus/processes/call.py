@@ -29,24 +29,16 @@ class ProcessDied(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Called:
-    """How a call ended.
-
-    Attributes
-    ----------
-    code : int
-        Exit code of its process (negative: the signal).
-    answer : object
-        What the function returned, from JSON; None: the process ended before.
-    said : str
-        What the process wrote to its standard error.
-    is_late : bool
-        Whether it took too long.
-    """
+    """How a call ended."""
 
     code: int
+    """Exit code of its process (negative: the signal)."""
     answer: Any
+    """What the function returned, from JSON; None: the process ended before."""
     said: str
+    """What the process wrote to its standard error."""
     is_late: bool
+    """Whether it took too long."""
 
     @property
     def last_line(self) -> str:

@@ -42,13 +42,8 @@ def lean(
 ) -> ComponentDescription:
     """Return a component without what few tools take.
 
-    Parameters
-    ----------
-    component : ComponentDescription
-    external : bool
-        Keep what a tool needs that answers contacts itself: applied forces, contact masses, instants of contacts.
-    enumerations : bool
-        Keep enumerations; else they are integers, their names in the descriptions.
+    `external` keeps what a tool needs that answers contacts itself: applied forces, contact masses, instants of
+    contacts. Enumerations are else integers, their names in the descriptions.
     """
     left_out = {"importer"} if external else {"importer", "external"}
     types = {e.name: _without(e, left_out) for e in component.enumerations}

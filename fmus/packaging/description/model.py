@@ -66,37 +66,7 @@ class Enumeration:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One variable of the FMU.
-
-    Attributes
-    ----------
-    value_reference : int
-        Index into the C table of variables; the same in both FMI versions and in every export.
-    field : str
-        Member of the component's C struct that stores it.
-    code : str
-        Name of its value reference in C, without the component's prefix.
-    initial : str or None
-        FMI's `initial`; None for inputs and the independent variable, which have no such attribute.
-    dependencies : tuple of str or None
-        Names of the knowns an output depends on; None says that it may depend on all of them. Only inputs
-        among them reach the description: FMI counts no parameter as a known of an output.
-    repeat : str
-        Name of the block it repeats in (`contact`), empty for a single variable.
-    repeat_index : int
-        1-based index in that block, 0 for a single variable.
-    ports : str
-        Who has a use for it: `importer` (this package's own alone), `external` (a tool that answers contacts);
-        empty: everybody.
-    counts : str
-        Name of the block of which it says how many are in use (`mode`); an export gives it that start value.
-    derivative : str
-        Name of the continuous state whose derivative it is, in model exchange.
-    event_indicator : bool
-        Whether its sign tells of events, in model exchange.
-    shown_name, shown_description : str
-        For a reader: with the letter k in place of the index.
-    """
+    """One variable of the FMU."""
 
     name: str
     description: str
@@ -104,9 +74,13 @@ class Variable:
     causality: str
     variability: str
     initial: str | None
+    """FMI's `initial`; None for inputs and the independent variable, which have no such attribute."""
     value_reference: int
+    """Index into the C table of variables; the same in both FMI versions and in every export."""
     field: str
+    """Member of the component's C struct that stores it."""
     code: str
+    """Name of its value reference in C, without the component's prefix."""
     unit: str = ""
     enumeration: str = ""
     start: Number | None = None
@@ -114,15 +88,23 @@ class Variable:
     maximum: Number | None = None
     dimensions: tuple[int, ...] = ()
     dependencies: tuple[str, ...] | None = None
+    """Knowns an output depends on (None: maybe all); only inputs reach the description, FMI counts no parameter."""
     versions: tuple[int, ...] = (2, 3)
     repeat: str = ""
+    """Name of the block it repeats in (`contact`), empty for a single variable."""
     repeat_index: int = 0
+    """1-based index in that block, 0 for a single variable."""
     counts: str = ""
+    """Name of the block of which it says how many are in use (`mode`); an export gives it that start value."""
     ports: str = ""
+    """Who has a use for it: this package's `importer`, an `external` tool that answers contacts; empty: everybody."""
     derivative: str = ""
+    """Name of the continuous state whose derivative it is, in model exchange."""
     event_indicator: bool = False
+    """Whether its sign tells of events, in model exchange."""
     shown_name: str = ""
     shown_description: str = ""
+    """`shown_name` and `shown_description` are for a reader: with the letter k in place of the index."""
 
     @property
     def count(self) -> int:

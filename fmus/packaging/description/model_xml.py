@@ -35,15 +35,9 @@ def model_description(
 ) -> str:
     """Return a component's model description; the same component gives the same bytes.
 
-    Parameters
-    ----------
-    component : ComponentDescription
-    fmi : str
-        `2.0` or `3.0`. Variables that only FMI 3.0 knows are left out for `2.0`.
-    edition : Edition, optional
-        Of an export: version and date are told, and what each unknown of initialization depends on.
-    source_files : sequence of str
-        C files of the FMU to be named, where `fmi` is `2.0`; FMI 3.0 has a file for them.
+    Variables that only FMI 3.0 knows are left out for `2.0`. An edition, of an export, adds version and date, and what
+    each unknown of initialization depends on. `source_files` are C files to be named in `2.0`; FMI 3.0 has a file for
+    them.
     """
     version = int(fmi[0])
     identity = {"fmiVersion": fmi, "guid" if version == 2 else "instantiationToken": component.token}

@@ -42,22 +42,9 @@ ALL = "{*}"
 
 
 def read_component(path: Path) -> ComponentDescription:
-    """Read one component's `variables.toml`.
+    """Read one component's `variables.toml`, repeated blocks written out.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    ComponentDescription
-        All of its variables, repeated blocks written out.
-
-    Raises
-    ------
-    ComponentFileError
-        With all problems of the file, one a line.
+    ComponentFileError has all problems of the file, one a line.
     """
     table, content = _table(path)
     included = [_table(path.parent / name) for name in table.get("component", {}).get("include", ())]

@@ -17,13 +17,7 @@ def readme_table(component: ComponentDescription) -> str:
 
 
 def with_table(readme: str, component: ComponentDescription) -> str:
-    """Return a README with its table up to date.
-
-    Raises
-    ------
-    ComponentFileError
-        The README has no pair of marker comments.
-    """
+    """Return a README with its table up to date; without a pair of marker comments ComponentFileError is raised."""
     before, begin, rest = readme.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):

@@ -17,18 +17,12 @@ from vibroimpact.fmus.safe_xml import root_of
 
 @dataclass(frozen=True, slots=True)
 class Amended:
-    """A description whose faults are mended, as far as they can be.
-
-    Attributes
-    ----------
-    content : bytes
-        The XML; the very bytes that were given where nothing was mended.
-    findings : tuple of Finding
-        All that is wrong with it.
-    """
+    """A description whose faults are mended, as far as they can be."""
 
     content: bytes
+    """The XML; the very bytes that were given where nothing was mended."""
     findings: tuple[Finding, ...]
+    """All that is wrong with it."""
 
     @property
     def refusals(self) -> tuple[str, ...]:
@@ -37,19 +31,9 @@ class Amended:
 
 
 def amended(content: bytes, schemas: Path) -> Amended:
-    """Return a description as FMPy reads it, with what was wrong in it.
+    """Return a modelDescription.xml as FMPy reads it, with what was wrong in it, by FMI's schemas in `fmi2` and `fmi3`.
 
-    Parameters
-    ----------
-    content : bytes
-        A modelDescription.xml.
-    schemas : Path
-        FMI's schemas, one folder for each version: `fmi2`, `fmi3`.
-
-    Raises
-    ------
-    ComponentFileError
-        It is no XML, has a document type, or is of no version that is known.
+    No XML, a document type, or an unknown version raises ComponentFileError.
     """
     version = root_of(content, "modelDescription.xml").get("fmiVersion", "")
     if version != "2.0" and not version.startswith("3.0"):

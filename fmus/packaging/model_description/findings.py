@@ -20,18 +20,12 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong with an FMU.
-
-    Attributes
-    ----------
-    grade : Grade
-        A remark changes no number; a doubt says what is assumed; a refusal has no way round.
-    text : str
-        One line: where, what was expected, what is there, what is made of it.
-    """
+    """One thing that is wrong with an FMU."""
 
     grade: Grade
+    """A remark changes no number; a doubt says what is assumed; a refusal has no way round."""
     text: str
+    """One line: where, what was expected, what is there, what is made of it."""
 
     def line(self) -> str:
         """Return the line that says it, with its grade where it is no refusal."""

@@ -46,19 +46,7 @@ _ATTRIBUTE = re.compile(r"attribute '([^']+)'")
 
 
 def amend_by_schema(root: Any, version: str, schemas: Path, findings: Findings) -> None:
-    """Amend a description until FMI's schema takes it, or add why it is refused.
-
-    Parameters
-    ----------
-    root : lxml element
-        The description; changed.
-    version : str
-        `2.0` or `3.0`.
-    schemas : Path
-        FMI's schemas, one folder for each version.
-    findings : Findings
-        Grows.
-    """
+    """Amend a description, in place, until the schema of its version takes it, or add why it is refused."""
     folder = schemas / f"fmi{version[0]}"
     _drop_annotations(root)
     _drop_unknown_attributes(root, version, folder, findings)

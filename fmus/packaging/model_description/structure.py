@@ -26,18 +26,9 @@ _PLACES = {
 
 
 def amend_structure(root: Any, variables: list[Variable], major: int, findings: Findings) -> None:
-    """Amend ModelStructure, and the derivatives of variables.
+    """Amend, in place, the ModelStructure of a description that the schema takes, and the derivatives of its variables.
 
-    Parameters
-    ----------
-    root : lxml element
-        The description, which the schema takes; changed.
-    variables : list of Variable
-        Its variables, amended.
-    major : int
-        Major version of FMI.
-    findings : Findings
-        Grows.
+    The variables are amended already.
     """
     structure = _Structure(root, variables, major, findings)
     structure.amend_derivatives()

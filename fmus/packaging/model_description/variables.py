@@ -76,17 +76,7 @@ def _default_variability(major: int, causality: str, kind: str) -> str:
 
 
 def amend_variables(root: Any, variables: list[Variable], findings: Findings) -> None:
-    """Amend the variables of a description.
-
-    Parameters
-    ----------
-    root : lxml element
-        The description, which the schema takes; changed.
-    variables : list of Variable
-        Its variables; changed.
-    findings : Findings
-        Grows.
-    """
+    """Amend, in place, the variables of a description that the schema takes."""
     types = _types(root)
     for variable in variables:
         _amend_type(variable, types, findings)
