@@ -22,13 +22,7 @@ class BoundedRequest(Request):
     """A request whose body holds a limited number of values."""
 
     async def json(self) -> Any:
-        """Return the body.
-
-        Raises
-        ------
-        HTTPException
-            It holds more values than any request has.
-        """
+        """Return the body; HTTPException where it holds more values than any request has."""
         if not hasattr(self, "_json"):
             text = (await self.body()).decode("utf-8-sig")
             if not is_small(text):

@@ -80,15 +80,8 @@ def most_connections() -> tuple[int, int]:
 class Connections:
     """The open connections of one service, the oldest first.
 
-    Parameters
-    ----------
-    most, most_with_young : int
-        Connections that may be open at a time, without and with those that have just been opened.
-
-    Attributes
-    ----------
-    turns : Turns
-        Turns of the requests of strangers.
+    At most `most` are open at a time, `most_with_young` with those just opened; `turns` are those of requests of
+    strangers.
     """
 
     def __init__(self, most: int, most_with_young: int) -> None:
@@ -170,13 +163,7 @@ class _BoundedHead(h11.Connection):
     is_too_long = False
 
     def next_event(self) -> Any:
-        """Return the next event.
-
-        Raises
-        ------
-        RemoteProtocolError
-            The head is too long, or no head of HTTP.
-        """
+        """Return the next event; RemoteProtocolError where the head is too long, or no head of HTTP."""
         if self.their_state is h11.IDLE:
             waiting, _ = self.trailing_data
             if len(waiting) > MOST_HEAD and not _ends_in(waiting[:MOST_HEAD]):

@@ -19,14 +19,9 @@ NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.+\-]{0,99}\.fmu$"
 
 
 class FmuStore:
-    """The FMUs of the folder of a service.
+    """The FMUs of the folder of a service, `fmus` in it, made when absent.
 
-    Parameters
-    ----------
-    folder : Path
-        `fmus` in the folder of the service; made when absent.
-    takes_uploads : bool
-        Whether others may add to it: an FMU is native code, which runs with the rights of the service.
+    Others may add to it if it takes uploads: an FMU is native code, which runs with the rights of the service.
     """
 
     def __init__(self, folder: Path, takes_uploads: bool) -> None:
@@ -47,12 +42,8 @@ class FmuStore:
     def add(self, file: Path, name: str) -> Path:
         """Take an FMU that was uploaded: moved to its place once its archive and its description are in order.
 
-        Nothing of it is loaded, and its description is read by a process of its own.
-
-        Raises
-        ------
-        UsageError
-            It is no FMU, there are too many, or another one has its name.
+        Nothing of it is loaded, and its description is read by a process of its own. UsageError: it is no FMU, there
+        are too many, or another one has its name.
         """
         refuse_device(name)
         try:

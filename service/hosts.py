@@ -15,22 +15,10 @@ _PORT = re.compile(r":[0-9]{0,5}$")
 
 
 class Hosts:
-    """The hosts of one service: its addresses, `localhost`, and the names that its owner gives it.
+    """The hosts of one service: the address on which it listens, `localhost`, and names by which others reach it.
 
-    Parameters
-    ----------
-    address : str
-        On which it listens.
-    names : sequence of str
-        Names or addresses by which others reach it, as through a proxy.
+    What is neither a name nor an address raises UsageError.
 
-    Raises
-    ------
-    UsageError
-        One of them is neither a name nor an address.
-
-    Examples
-    --------
     >>> hosts = Hosts("127.0.0.1", ["lab.example"])
     >>> hosts.why_not(b"127.0.0.1:8737", "127.0.0.1"), hosts.why_not(b"LAB.example", "127.0.0.1")
     ('', '')
@@ -53,12 +41,8 @@ class Hosts:
     def why_not(self, host: bytes | None, served: str) -> str:
         """Return why a request is refused that names a host; empty where it is taken.
 
-        Parameters
-        ----------
-        host : bytes or None
-            The header; browsers always send it, and only they can be misled.
-        served : str
-            Address of this machine that the connection came to.
+        Browsers always send the header, and only they can be misled. `served` is the address of this machine that the
+        connection came to.
         """
         if host is None:
             return ""

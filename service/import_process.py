@@ -40,16 +40,9 @@ def contents(recording: Recording) -> list[dict[str, Any]]:
 
 
 def answer(file: str, target: str, settings: str) -> dict[str, Any]:
-    """Import a file; return the `channels` of its recording, why it `failed`, or the error of a disk that is `full`.
+    """Import a file that was uploaded, with settings in JSON, and write its recording to the target.
 
-    Parameters
-    ----------
-    file : str
-        What was uploaded.
-    target : str
-        Where its recording is written.
-    settings : str
-        Of the import, JSON.
+    The answer has the `channels` of the recording, why it `failed`, or the error of a disk that is `full`.
     """
     path = Path(file)
     memory = import_memory(machine_memory())

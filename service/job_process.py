@@ -42,24 +42,16 @@ CONNECT_SECONDS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a job's process is to do.
-
-    Attributes
-    ----------
-    kind : str
-        `campaign`, `run`, `replay` or `estimate`.
-    workers : int or None
-        Worker processes; None: one for each processor.
-    scheduler : str or None
-        Address of a Dask scheduler to use instead.
-    options : dict
-        Of a replay `fit` and `score`, of an estimate what `estimates.estimate` takes.
-    """
+    """What a job's process is to do."""
 
     kind: str
+    """`campaign`, `run`, `replay` or `estimate`."""
     workers: int | None = None
+    """Worker processes; None: one for each processor."""
     scheduler: str | None = None
+    """Address of a Dask scheduler to use instead."""
     options: dict[str, Any] = field(default_factory=dict)
+    """Of a replay `fit` and `score`, of an estimate what `estimates.estimate` takes."""
 
     def written(self) -> str:
         """Return it as one word of a command line."""

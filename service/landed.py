@@ -45,51 +45,35 @@ Later: TypeAlias = Callable[[], Found]
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A variable, or a swept parameter.
-
-    Attributes
-    ----------
-    name, label, units : str
-    along : str
-        The dimension besides that of runs, or that a swept parameter shares with those that move with it; or empty.
-    """
+    """A variable, or a swept parameter."""
 
     name: str
     label: str
     units: str
     along: str = ""
+    """The dimension besides that of runs, or that a swept parameter shares with those moving with it; or empty."""
 
 
 @dataclass(frozen=True, slots=True)
 class Landed:
-    """One variable of some runs; a row is a value, so a run has several where it has several periods or impacts.
-
-    Attributes
-    ----------
-    quantities : tuple of Quantity
-        All that could have been asked for.
-    axes : tuple of Quantity
-        The swept parameters, in the order of the scene.
-    runs : ndarray of int, shape (run,)
-        Index of each run in its campaign.
-    directions, outcomes : ndarray of int, shape (run,)
-    coordinates : ndarray of float, shape (axis, run)
-    owners : ndarray of int, shape (row,)
-        Which of the runs a row belongs to, by its place.
-    values : ndarray of float, shape (row,)
-    is_class : bool
-        Whether the values are codes of classes (`run_classes.ClassColumns.codes`).
-    """
+    """One variable of some runs; a row is a value, so a run has several where it has several periods or impacts."""
 
     quantities: tuple[Quantity, ...]
+    """All that could have been asked for."""
     axes: tuple[Quantity, ...]
+    """The swept parameters, in the order of the scene."""
     runs: NDArray[np.int64]
+    """Index of each run in its campaign, shape (run,), as directions and outcomes."""
     directions: NDArray[np.int8]
     outcomes: NDArray[np.int8]
     coordinates: NDArray[np.float64]
+    """Shape (axis, run)."""
     owners: NDArray[np.int64]
+    """Which of the runs a row belongs to, by its place, shape (row,)."""
     values: NDArray[np.float64]
+    """Shape (row,)."""
     is_class: bool = False
+    """Whether the values are codes of classes (`run_classes.ClassColumns.codes`)."""
 
     @property
     def size(self) -> int:
@@ -118,8 +102,6 @@ class Failure:
 class LandedReader:
     """Reads what has landed, and remembers what it found last in each file.
 
-    Examples
-    --------
     >>> LandedReader().read([Path("campaign/dataset.nc")], "displacement_range")     # doctest: +SKIP
     """
 
@@ -129,12 +111,7 @@ class LandedReader:
     def read(self, files: Sequence[Path], variable: str) -> Landed | None:
         """Return a variable from files of the same campaign; None where there are no files yet.
 
-        Raises
-        ------
-        KeyError
-            There is no such variable.
-        DatasetError
-            A file is damaged.
+        An unknown variable raises KeyError, a damaged file DatasetError.
         """
 
         def piece(file: netCDF4.Dataset) -> Later[tuple[Landed | None, int]]:
@@ -155,10 +132,7 @@ class LandedReader:
     def failures(self, files: Sequence[Path], outcomes: Sequence[int]) -> list[Failure]:
         """Return the runs of a campaign with one of these outcomes, in the order of their index.
 
-        Raises
-        ------
-        DatasetError
-            A file is damaged.
+        A damaged file raises DatasetError.
         """
 
         def failed(file: netCDF4.Dataset) -> Later[tuple[list[Failure], int]]:

@@ -46,8 +46,6 @@ class _Seldom(logging.Filter):
 class _Lines(logging.Formatter):
     """Writes a record as one line of JSON.
 
-    Examples
-    --------
     >>> record = logging.makeLogRecord({"msg": "job", "created": 0.0, "levelname": "INFO", "job": "a1"})
     >>> _Lines().format(record)
     '{"at": "1970-01-01T00:00:00.000Z", "level": "info", "event": "job", "job": "a1"}'

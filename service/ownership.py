@@ -14,14 +14,9 @@ _OWN = (".lock", URL_FILE, TOKEN_FILE, "jobs", "recordings", "fmus")
 
 
 def refuse_foreign_folder(folder: Path, database: str) -> None:
-    """Raise UsageError where the folder of a service, or what it believes in it, is another user's.
+    """Raise UsageError if the folder of a service, which need not exist, or the database in it, is another user's.
 
-    Parameters
-    ----------
-    folder : Path
-        Need not exist.
-    database : str
-        Name of its database.
+    The service believes what is in its database.
     """
     if not os.path.lexists(folder):
         return

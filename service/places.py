@@ -20,15 +20,8 @@ _LAST_INDEX = re.compile(r"\[\d+\]$")
 
 
 class Places:
-    """The places of the keys of one text.
+    """The places of the keys of one TOML text.
 
-    Parameters
-    ----------
-    text : str
-        TOML.
-
-    Examples
-    --------
     >>> places = Places("# a mass\\n[body]\\n  mass = -1")
     >>> places.of("body.mass"), places.of("body.stiffness"), places.of("record")
     ((3, 3), (2, 1), (1, 1))

@@ -43,17 +43,10 @@ OBSERVED = ("displacement", "velocity")
 
 
 def answer(scene: str, results: str, run: int) -> dict[str, Any]:
-    """Return the motion of one point, or why it `failed`.
+    """Return the motion of one point, by its index, or why it `failed`.
 
-    Parameters
-    ----------
-    scene : str
-        Scene file.
-    results : str
-        Folder of a campaign, or dataset of a run; in a sweep with a path the point starts where the one before it had
-        ended.
-    run : int
-        Index of the point.
+    Results are the folder of a campaign, or the dataset of a run; in a sweep with a path the point starts where the one
+    before it had ended.
     """
     try:
         return simulated(Path(scene), Path(results), run)
@@ -117,10 +110,7 @@ def _place_of(scene: Scene, results: Path, run: int) -> tuple[BranchPoint, Branc
 def _start_of(results: Path, branch: Branch, run: int) -> State | None:
     """Return the state that a point of a path starts from: that of the nearest one before it that came to its end.
 
-    Raises
-    ------
-    UsageError
-        The point before it has not landed.
+    A point before it that has not landed raises UsageError.
     """
     if branch.direction == Direction.independent.name:
         return None

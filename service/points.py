@@ -19,21 +19,10 @@ _FREE = threading.BoundedSemaphore(MOST_AT_ONCE)
 
 
 def simulated_point(scene: Path, results: Path, run: int) -> dict[str, Any]:
-    """Return the motion of one point of a campaign.
+    """Return the motion of one point of a campaign, by its index.
 
-    Parameters
-    ----------
-    scene : Path
-        Scene file.
-    results : Path
-        Folder of the campaign, or dataset of a run: where the point before it ended.
-    run : int
-        Index of the point.
-
-    Raises
-    ------
-    ProblemError
-        It took too long, failed, or too many are being simulated.
+    Results are its folder, or the dataset of a run: where the point before it ended. ProblemError: it took too long,
+    failed, or too many are being simulated.
     """
     if not _FREE.acquire(blocking=False):
         raise ProblemError(

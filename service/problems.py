@@ -29,17 +29,7 @@ MOST_CHARACTERS = 1000
 
 
 class ProblemError(Exception):
-    """A request that is refused.
-
-    Parameters
-    ----------
-    status : HTTPStatus
-    detail : str
-        What is wrong, what was expected.
-    headers : mapping, optional
-    members
-        Further members of the answer.
-    """
+    """A request that is refused: the detail says what is wrong and what was expected, `members` are further ones."""
 
     def __init__(
         self, status: HTTPStatus, detail: str, headers: Mapping[str, str] | None = None, **members: Any

@@ -29,41 +29,25 @@ NAME = r"^[A-Za-z0-9_][A-Za-z0-9_ .+\-]{0,99}$"
 
 @dataclass(frozen=True, slots=True)
 class StoredRecording:
-    """A recording of the service.
-
-    Attributes
-    ----------
-    number : int
-        In the order of upload, from 1.
-    id : str
-        32 hexadecimal digits.
-    name : str
-        By which scenes name it: that of the file uploaded, with the ending `.nc`.
-    source : str
-        SHA-256 of the file uploaded, and its import settings.
-    bytes : int
-    channels : list of dict
-        `name`, `units`, `samples` of each channel; of a train of events `events` in place of `samples`.
-    created : float
-        Seconds since 1970.
-    """
+    """A recording of the service."""
 
     number: int
+    """In the order of upload, from 1."""
     id: str
+    """32 hexadecimal digits."""
     name: str
+    """By which scenes name it: that of the file uploaded, with the ending `.nc`."""
     source: str
+    """SHA-256 of the file uploaded, and its import settings."""
     bytes: int
     channels: list[dict[str, Any]]
+    """`name`, `units`, `samples` of each channel; of a train of events `events` in place of `samples`."""
     created: float
+    """Seconds since 1970."""
 
 
 class RecordingStore:
-    """The recordings of the folder of a store.
-
-    Parameters
-    ----------
-    store : Store
-    """
+    """The recordings of the folder of a store."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -77,13 +61,7 @@ class RecordingStore:
         return self.folder / f"{name}.nc"
 
     def file(self, recording: StoredRecording) -> Path:
-        """Return the file of a recording.
-
-        Raises
-        ------
-        UsageError
-            Somebody has removed it.
-        """
+        """Return the file of a recording; UsageError where somebody has removed it."""
         path = self.path(recording.id)
         if not path.is_file():
             raise UsageError(
@@ -93,13 +71,7 @@ class RecordingStore:
         return path
 
     def find(self, name: str) -> StoredRecording:
-        """Return a recording by its id or its name.
-
-        Raises
-        ------
-        KeyError
-            There is none.
-        """
+        """Return a recording by its id or its name; an unknown one raises KeyError."""
         rows = self._store.rows(f"SELECT {_COLUMNS} FROM recordings WHERE id = ? OR name = ?", name, name)
         if not rows:
             raise KeyError(name)
@@ -116,19 +88,8 @@ class RecordingStore:
     def add(self, file: Path, source: str, settings: str) -> StoredRecording:
         """Import a file that was uploaded; the same file with the same name and settings again is the same recording.
 
-        Parameters
-        ----------
-        file : Path
-            Under the name that it was given, in a folder of its own.
-        source : str
-            SHA-256 of file and settings.
-        settings : str
-            Of the import, JSON.
-
-        Raises
-        ------
-        UsageError
-            It is no recording, or another one has its name.
+        The file has its given name, in a folder of its own; `source` is the SHA-256 of file and settings (JSON).
+        UsageError: it is no recording, or another one has its name.
         """
         name, known = stored_name(file.name), self._known(stored_name(file.name), source)
         if known is not None:
@@ -202,10 +163,7 @@ def stored_name(name: str) -> str:
 def imported(file: Path, target: Path, settings: str) -> list[dict[str, Any]]:
     """Import a file in a process that may die or hang; return what its channels are.
 
-    Raises
-    ------
-    UsageError
-        It is no recording, or its import did not end.
+    UsageError: it is no recording, or its import did not end.
     """
     function = "vibroimpact.service.import_process:answer"
     done = call(function, str(file), str(target), settings, seconds=IMPORT_SECONDS, errors="dropped")

@@ -76,11 +76,7 @@ _ESTIMATE: TypeAdapter[BaseModel] = TypeAdapter(Estimate)
 def estimate(folder: Path, options: dict[str, Any]) -> None:
     """Estimate in the folder of a job.
 
-    Parameters
-    ----------
-    folder : Path
-    options : dict
-        `data`, the name of a recording or a dataset in it, and `asked`, an `Estimate`.
+    The options are `data`, the name of a recording or a dataset in it, and `asked`, an `Estimate`.
     """
     asked = _ESTIMATE.validate_python(options["asked"]).model_dump()
     declared = ESTIMATES[asked["kind"]]

@@ -30,19 +30,14 @@ def can_be_classified(file: netCDF4.Dataset) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ClassColumns:
-    """The values of a file that tell the classes of its runs; read at once, classified without the file.
-
-    Attributes
-    ----------
-    states : ndarray of float, shape (run, period, state)
-    impacts : ndarray of int, shape (run, period), or None
-        Impacts of each period, where the file has them.
-    outcomes, sticks : ndarray of int, shape (run,)
-    """
+    """The values of a file that tell the classes of its runs; read at once, classified without the file."""
 
     states: NDArray[np.float64]
+    """Shape (run, period, state)."""
     impacts: NDArray[np.int64] | None
+    """Impacts of each period, shape (run, period), where the file has them."""
     outcomes: NDArray[np.int8]
+    """Shape (run,), as sticks."""
     sticks: NDArray[np.int64]
 
     @classmethod

@@ -37,20 +37,13 @@ class Shelf:
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A scene that was submitted.
-
-    Attributes
-    ----------
-    scene : Scene
-    text : str
-        TOML, with the recordings that were named beside it.
-    files : dict of str to Path
-        The files of the service that it reads, by the names it has for them.
-    """
+    """A scene that was submitted."""
 
     scene: Scene
     text: str
+    """TOML, with the recordings that were named beside it."""
     files: dict[str, Path]
+    """The files of the service that it reads, by the names it has for them."""
 
     @property
     def kind(self) -> Kind:
@@ -61,20 +54,10 @@ class Taken:
 
 
 def taken_scene(text: str, shelf: Shelf, recordings: Sequence[str] = ()) -> Taken:
-    """Return a scene that was submitted.
+    """Return a scene that was submitted as TOML.
 
-    Parameters
-    ----------
-    text : str
-        TOML.
-    shelf : Shelf
-    recordings : sequence of str
-        Names or ids of recordings that the scene replays, where it names none itself.
-
-    Raises
-    ------
-    SceneError
-        With all of its problems; among them files that the service does not have: a stranger names no paths here.
+    Recordings are named or given by their ids, where the scene names none itself. SceneError has all of its problems;
+    among them files that the service does not have: a stranger names no paths here.
     """
     document = parse_scene_toml(text, SOURCE)
     files, problems = _files(document, shelf)
@@ -150,8 +133,6 @@ def located(problems: Sequence[str], text: str) -> list[dict[str, Any]]:
 
     Where a key is absent, the place is that of its table.
 
-    Examples
-    --------
     >>> located(["scene: body.mass: expected a number > 0, got -1."], "# a mass\\n[body]\\n  mass = -1")
     [{'message': 'body.mass: expected a number > 0, got -1.', 'line': 3, 'column': 3}]
     """

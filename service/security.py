@@ -50,10 +50,7 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 def token_of(folder: Path) -> str:
     """Return the token of a service, made at its first start in a file that only its owner reads.
 
-    Raises
-    ------
-    UsageError
-        Others may read the file, or there is no token in it.
+    UsageError: others may read the file, or there is no token in it.
     """
     path = folder / "token"
     try:
@@ -87,16 +84,9 @@ def _token_in(path: Path) -> str:
 
 
 class Guarded:
-    """An application behind its token: asks for it, limits what is sent, and adds headers to all answers.
+    """An ASGI application behind its token: asks for it, limits what is sent, and adds headers to all answers.
 
-    Parameters
-    ----------
-    app : ASGI application
-    token : str
-    sessions : Sessions
-        Of its page, which are as good as the token.
-    hosts : Hosts
-        Names by which the service may be asked.
+    The sessions of its page are as good as the token; the hosts are names by which the service may be asked.
     """
 
     def __init__(self, app: Application, token: str, sessions: Sessions, hosts: Hosts) -> None:

@@ -22,12 +22,6 @@ OWN_SITES = ("same-origin", "none")
 class Sessions:
     """Makes and knows the cookies of one service.
 
-    Parameters
-    ----------
-    token : str
-
-    Examples
-    --------
     >>> sessions = Sessions("token")
     >>> sessions.is_known(sessions.made()), sessions.is_known("99999999999.forged")
     (True, False)

@@ -17,14 +17,9 @@ LEVELS = 2000
 
 
 class Selection:
-    """The part of a campaign that is asked for.
+    """The part of a campaign that is asked for, by swept parameters.
 
-    Parameters
-    ----------
-    at : mapping of str to float
-        Swept parameters that are held: the nearest value that there is.
-    within : mapping of str to (float, float)
-        Lowest and highest value of swept parameters.
+    They are held `at` the nearest value that there is, or `within` a lowest and a highest one.
     """
 
     def __init__(self, at: dict[str, float], within: dict[str, tuple[float, float]]) -> None:
@@ -32,15 +27,8 @@ class Selection:
 
     @classmethod
     def from_words(cls, at: Sequence[str], within: Sequence[str]) -> Selection:
-        """Read `NAME:VALUE` and `NAME:LOW:HIGH`.
+        """Read `NAME:VALUE` and `NAME:LOW:HIGH`; another text raises ValueError with what was expected.
 
-        Raises
-        ------
-        ValueError
-            With what was expected.
-
-        Examples
-        --------
         >>> Selection.from_words(["restitution:0.7"], ["angular_frequency:0.8:0.9"]).within
         {'angular_frequency': (0.8, 0.9)}
         """
@@ -49,13 +37,7 @@ class Selection:
         return cls(held, ranges)
 
     def runs(self, landed: Landed) -> NDArray[np.bool_]:
-        """Return which runs are asked for.
-
-        Raises
-        ------
-        ValueError
-            A name is no swept parameter.
-        """
+        """Return which runs are asked for; a name that is no swept parameter raises ValueError."""
         names = [axis.name for axis in landed.axes]
         for name in (*self.at, *self.within):
             if name not in names:

@@ -91,49 +91,33 @@ ENDED = (State.cancelled, State.failed, State.done)
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A scene that was submitted.
-
-    Attributes
-    ----------
-    number : int
-        In the order of submission, from 1.
-    id : str
-        32 hexadecimal digits.
-    title : str
-        Of its scene.
-    state : State
-    workers : int or None
-        Worker processes; None: one for each processor.
-    kind : Kind
-    created, started, ended : float or None
-        Seconds since 1970.
-    total, done : int
-        Points; 0 of 0 before it has begun.
-    attempts : int
-        How often it was started.
-    message : str
-        Why it is where it is, in words; empty where nothing is to be said.
-    options : dict
-        What its process is told beside its kind; see `job_process.Work`.
-    outcomes : dict of str to int
-        How many points ended in each way.
-    """
+    """A scene that was submitted."""
 
     number: int
+    """In the order of submission, from 1."""
     id: str
+    """32 hexadecimal digits."""
     title: str
+    """Of its scene."""
     state: State
     workers: int | None
+    """Worker processes; None: one for each processor."""
     kind: Kind
     created: float
     started: float | None
     ended: float | None
+    """`created`, `started` and `ended`: seconds since 1970."""
     total: int
     done: int
+    """Points of the `total`; 0 of 0 before it has begun."""
     attempts: int
+    """How often it was started."""
     message: str
+    """Why it is where it is, in words; empty where nothing is to be said."""
     options: dict[str, Any]
+    """What its process is told beside its kind; see `job_process.Work`."""
     outcomes: dict[str, int]
+    """How many points ended in each way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,25 +133,15 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a job is made of.
-
-    Attributes
-    ----------
-    kind : Kind
-    title : str
-    text : str
-        The scene; empty where there is none.
-    workers : int or None
-    files : dict of str to Path
-        What it reads, by the names it has in the folder of the job: linked, so that what is deleted later stays there.
-    options : dict
-    """
+    """What a job is made of."""
 
     kind: Kind
     title: str
     text: str = ""
+    """The scene; empty where there is none."""
     workers: int | None = None
     files: dict[str, Path] = field(default_factory=dict)
+    """What it reads by names in the job's folder: linked, so that what is deleted later stays there."""
     options: dict[str, Any] = field(default_factory=dict)
 
 
@@ -180,13 +154,7 @@ class QueueFullError(Exception):
 
 
 class Store:
-    """The jobs of one folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the service; the database is `service.sqlite` in it.
-    """
+    """The jobs of the folder of a service; the database is `service.sqlite` in it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -258,20 +226,9 @@ class Store:
     ) -> tuple[Job, bool]:
         """Accept what was asked for; return its job, and whether it is new.
 
-        Parameters
-        ----------
-        asked : Asked
-        key, digest : str
-            Idempotency key and hash of the request; the same pair again is the same job.
-        most_queued : int, optional
-            Jobs that may wait, however many requests come at once.
-
-        Raises
-        ------
-        QueueFullError
-            As many jobs wait already.
-        KeyReusedError
-            The key came with another digest before.
+        The same idempotency key with the same digest of the request again is the same job. QueueFullError: as many jobs
+        as may wait, however many requests come at once, wait already. KeyReusedError: the key came with another digest
+        before.
         """
         with self.transaction() as database:
             if key:
@@ -332,27 +289,14 @@ class Store:
             shutil.rmtree(doomed)
 
     def job(self, name: str) -> Job:
-        """Return a job.
-
-        Raises
-        ------
-        KeyError
-            There is none of this name.
-        """
+        """Return a job; an unknown name raises KeyError."""
         rows = self.rows(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", name)
         if not rows:
             raise KeyError(name)
         return _job(rows[0])
 
     def jobs(self, *, before: int | None = None, most: int = 100) -> list[Job]:
-        """Return jobs, the newest first.
-
-        Parameters
-        ----------
-        before : int, optional
-            Only those of lower number.
-        most : int
-        """
+        """Return jobs, the newest first, only those of lower number than `before`."""
         rows = self.rows(
             f"SELECT {_COLUMNS} FROM jobs WHERE number < ? ORDER BY number DESC LIMIT ?",
             *(2**62 if before is None else before, most),

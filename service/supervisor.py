@@ -41,11 +41,7 @@ LAST_LINES = 5
 class Supervisor:
     """Takes jobs from a store and runs them until it is closed.
 
-    Parameters
-    ----------
-    store : Store
-    scheduler : str or None
-        Address of a Dask scheduler whose workers compute; None: workers on this machine.
+    Workers of a Dask scheduler compute; None: workers on this machine.
     """
 
     def __init__(self, store: Store, scheduler: str | None = None) -> None:
@@ -263,13 +259,7 @@ class Told:
 
 
 class JobLog:
-    """The log of a job: whole lines; those that a full disk has no room for are lost, and that is logged.
-
-    Parameters
-    ----------
-    path : Path
-    job : str
-    """
+    """The log of a job: whole lines; those that a full disk has no room for are lost, and that is logged."""
 
     def __init__(self, path: Path, job: str) -> None:
         self._file = path.open("ab", buffering=0)

@@ -17,8 +17,6 @@ class Turns:
 
     The event loop is free for others between two turns, however many connections wait.
 
-    Examples
-    --------
     >>> async def waited():
     ...     turns = Turns()
     ...     return await asyncio.gather(turns.wait("a"), turns.wait("b"), turns.wait("c"))

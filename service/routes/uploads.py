@@ -35,19 +35,7 @@ class Upload:
 
 
 class Uploads:
-    """Takes uploads, some at a time.
-
-    Parameters
-    ----------
-    folder : Path
-        Where they lie meanwhile, which is this service's alone; what a killed one left there is removed.
-
-    Attributes
-    ----------
-    turn : asynchronous context manager
-        Of reading what was uploaded: as many at a time as the memory of the machine allows. A body that arrives slowly
-        holds none.
-    """
+    """Takes uploads, some at a time, into a folder of this service alone; what a killed one left there is removed."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -55,16 +43,11 @@ class Uploads:
             shutil.rmtree(left)
         self._receptions = asyncio.Semaphore(MOST_RECEIVED)
         self.turn = asyncio.Semaphore(imports_at_once(machine_memory()))
+        """Of reading uploads, as many as the memory allows; a body that arrives slowly holds none."""
 
     @asynccontextmanager
     async def received(self, request: Request, name: str) -> AsyncIterator[Upload]:
-        """Receive the body of a request under a name.
-
-        Raises
-        ------
-        ProblemError
-            It has stalled, or was cut off.
-        """
+        """Receive the body of a request under a name; ProblemError where it has stalled, or was cut off."""
         async with self._receptions:
             with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=self._folder) as folder:
                 file = Path(folder, name)
