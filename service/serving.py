@@ -47,11 +47,8 @@ LAST_SECONDS = 2
 def serve(options: Serve) -> None:
     """Serve until a signal ends it.
 
-    Raises
-    ------
-    UsageError
-        The folder or the port is taken, the address is not of this machine alone and nobody allowed that, or nothing
-        is reached over loopback.
+    UsageError: the folder or the port is taken, the address is not of this machine alone and nobody allowed that, or
+    nothing is reached over loopback.
     """
     folder, host = options.data, options.host
     _refuse_remote(host, options.allow_remote)

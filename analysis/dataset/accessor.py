@@ -164,13 +164,7 @@ class VibroimpactAccessor:
 
 
 def _rows_of(dataset: xr.Dataset, dimension: str) -> list[Any]:
-    """Return the names of the columns of a ragged array.
-
-    Raises
-    ------
-    DatasetError
-        It was not recorded.
-    """
+    """Return the names of the columns of a ragged array; DatasetError if it was not recorded."""
     if dimension not in dataset.dims:
         raise DatasetError(
             f"{dimension}s: expected them in the dataset, got none recorded. "

@@ -26,14 +26,21 @@ _OCTAVES = (MOST_RADII - 6) // RADII_PER_OCTAVE
 
 @dataclass(frozen=True, slots=True)
 class CorrelationSums:
-    """Near pairs of delay vectors."""
+    """Near pairs of delay vectors.
+
+    Attributes
+    ----------
+    radii : ndarray of float, shape (radius,)
+        In the unit of the values, ascending.
+    near : ndarray of int, shape (embedding, radius)
+        Pairs nearer than the radius, for m = 1, 2, ...
+    pairs : ndarray of int, shape (embedding,)
+        Pairs there are.
+    """
 
     radii: Floats
-    """In the unit of the values, ascending, shape (radius,)."""
     near: NDArray[np.int64]
-    """Pairs nearer than the radius, for m = 1, 2, ..., shape (embedding, radius)."""
     pairs: NDArray[np.int64]
-    """Pairs there are, shape (embedding,)."""
 
     @property
     def sums(self) -> Floats:
@@ -57,13 +64,27 @@ class CorrelationSums:
 def correlation_sums(
     values: Floats, embedding: int, *, theiler: int = 0, radii: Floats | None = None
 ) -> CorrelationSums:
-    """Count the near pairs of the delay vectors of a sequence, of which none reaches over a NaN.
+    """Count the near pairs of the delay vectors of a sequence.
 
-    The largest m is `embedding`, 1 to 16. Pairs i < j with j - i <= `theiler` do not count; 0: all do, but none with
-    itself. It is at least 1 for maps, and a few correlation times for samples of a flow. The radii are from
-    `fmus.core.radius_ladder`, by default 15 octaves down from the range of the values. Values all the same, or too few
-    for a pair, raise EstimationError.
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        x; no vector reaches over a NaN.
+    embedding : int
+        Largest m, 1 to 16.
+    theiler : int
+        Pairs i < j with j - i <= `theiler` do not count; 0: all do, but none with itself. At least 1 for maps; a few
+        correlation times for samples of a flow.
+    radii : ndarray of float, optional
+        From `fmus.core.radius_ladder`; by default 15 octaves down from the range of the values.
 
+    Raises
+    ------
+    EstimationError
+        The values are all the same, or too few to make a pair.
+
+    Examples
+    --------
     >>> sums = correlation_sums(np.random.default_rng(1).random(2000), 2)
     >>> bool(np.all(np.abs(fitted_slopes(sums) - [1.0, 2.0]) < 0.1))
     True

@@ -15,13 +15,28 @@ JUMP = 0.05
 
 
 def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
-    """Return between which neighbouring runs of a sweep of one parameter, adaptive or not, the motion jumps.
+    """Return between which neighbouring runs of a sweep of one parameter the motion jumps.
 
-    A `jump` is a change of the displacement range, over the largest one. The dataset has along `jump`: `below` and
-    `above`, the values on its two sides; `direction`; `period` and `impacts` of the motion P(p,q) on each of them,
-    along `side` (period 0: aperiodic). DatasetError: more than one parameter is swept, or none; or one value is for all
-    periods.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As `open_dataset` gives it, adaptive or not.
+    jump : float
+        Change of the displacement range, over the largest one, that counts as a jump.
 
+    Returns
+    -------
+    xarray.Dataset
+        Along `jump`: `below` and `above`, the values on its two sides; `direction`; `period` and `impacts` of the
+        motion P(p,q) on each of them, along `side` (period 0: aperiodic).
+
+    Raises
+    ------
+    DatasetError
+        The dataset sweeps more than one parameter, or none; or it has one value for all periods.
+
+    Examples
+    --------
     >>> jumps_of(open_dataset("campaign")).above.values  # doctest: +SKIP
     """
     names = [name for name in swept_names(dataset) if dataset[name].size > 1]

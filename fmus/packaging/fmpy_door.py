@@ -79,12 +79,8 @@ class Reading:
 def read(content: bytes) -> Reading:
     """Read a modelDescription.xml; what breaks FMI's rules is mended where it changes no number, and said.
 
-    Pure: no file is read but FMI's schemas.
-
-    Raises
-    ------
-    ComponentFileError
-        It breaks FMI's rules where there is no way round; all problems, one a line.
+    Pure: no file is read but FMI's schemas. ComponentFileError: it breaks FMI's rules where there is no way round; all
+    problems, one a line.
     """
     mended = amended(content, schema_folder())
     if mended.refusals:

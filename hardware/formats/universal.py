@@ -42,15 +42,24 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class UniversalFunction:
-    """A function of dataset 58."""
+    """A function of dataset 58.
+
+    Attributes
+    ----------
+    kind : str
+        `a frequency response`, `a power spectral density`, `a time response`, ...
+    name : str
+    abscissa : ndarray of float, shape (point,)
+        In `abscissa_unit`: Hz for a spectrum, s for a time response.
+    values : ndarray of float or complex, shape (point,)
+        In `unit`, over `per_unit` where there is one: `m/s^2` per `N`.
+    response, reference : Place
+    """
 
     kind: str
-    """`a frequency response`, `a power spectral density`, `a time response`, ..."""
     name: str
     abscissa: Floats
-    """Shape (point,), in `abscissa_unit`: Hz for a spectrum, s for a time response."""
     values: Numbers
-    """Float or complex, shape (point,), in `unit`, over `per_unit` where there is one: `m/s^2` per `N`."""
     abscissa_unit: str
     unit: str
     per_unit: str
@@ -60,47 +69,81 @@ class UniversalFunction:
 
 @dataclass(frozen=True, slots=True)
 class UniversalShape:
-    """Data at nodes of dataset 55."""
+    """Data at nodes of dataset 55.
+
+    Attributes
+    ----------
+    kind : str
+        `a normal mode`, `a complex mode`, ...
+    name : str
+    number : int
+        Of the mode, or of the step of frequency.
+    frequency : float
+        Hz; NaN for a complex mode.
+    damping_ratio : float
+        Viscous, relative to the critical one; NaN where the dataset has none.
+    eigenvalue : complex
+        1/s; NaN for a normal mode.
+    nodes : ndarray of int, shape (node,)
+    values : ndarray of float or complex, shape (node, direction)
+        X, Y, Z, and rotations about them where there are six.
+    """
 
     kind: str
-    """`a normal mode`, `a complex mode`, ..."""
     name: str
     number: int
-    """Number of the mode, or of the frequency step."""
     frequency: float
-    """Hz; NaN for a complex mode."""
     damping_ratio: float
-    """Viscous, relative to the critical one; NaN where the dataset has none."""
     eigenvalue: complex
-    """1/s; NaN for a normal mode."""
     nodes: NDArray[np.intp]
-    """Shape (node,)."""
     values: Numbers
-    """Float or complex, shape (node, direction): X, Y, Z, and rotations about them where there are six."""
 
 
 @dataclass(frozen=True, slots=True)
 class UniversalFile:
-    """Datasets of a universal file by what they are."""
+    """Datasets of a universal file by what they are.
+
+    Attributes
+    ----------
+    functions : sequence of UniversalFunction
+    shapes : sequence of UniversalShape
+    nodes : ndarray of int, shape (node,)
+        Labels of the nodes of datasets 15 and 2411.
+    coordinates : ndarray of float, shape (node, 3)
+        In the unit of length of the file, `units`.
+    traces : mapping
+        Labels of nodes that are joined by lines, by the name of the trace; 0 lifts the pen.
+    units : str
+        The system of units of dataset 164; empty where there is none.
+    left_out : mapping
+        Number of datasets of other types, by type.
+    """
 
     functions: Sequence[UniversalFunction]
     shapes: Sequence[UniversalShape]
     nodes: NDArray[np.intp]
-    """Labels of the nodes of datasets 15 and 2411, shape (node,)."""
     coordinates: Floats
-    """Shape (node, 3), in the unit of length of the file, `units`."""
     traces: Mapping[str, NDArray[np.intp]]
-    """Labels of nodes that are joined by lines, by the name of the trace; 0 lifts the pen."""
     units: str
-    """The system of units of dataset 164; empty where there is none."""
     left_out: Mapping[int, int]
-    """Number of datasets of other types, by type."""
 
 
 def read_universal(path: os.PathLike[str] | str) -> UniversalFile:
-    """Return functions, shapes and geometry (datasets 58, 55, 15, 82, 2411, 164), equal to what pyuff reads.
+    """Return functions, shapes and geometry of a universal file, equal to what pyuff reads.
 
-    DatasetError: pyuff is not installed, or the file is damaged, cut off, or holds more than an import takes.
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    UniversalFile
+        Of datasets 58, 55, 15, 82, 2411 and 164.
+
+    Raises
+    ------
+    DatasetError
+        pyuff is not installed, the file is damaged, cut off, or holds more than an import takes.
     """
     types, datasets, cut = read_datasets_apart(Path(path), _READ)
     if cut:

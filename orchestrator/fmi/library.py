@@ -27,13 +27,7 @@ class Library:
         self._handle = _load(binary_path(fmu), fmu.source)
 
     def function(self, name: str, result: Any = ctypes.c_int) -> Function:
-        """Return a function by name.
-
-        Raises
-        ------
-        ComponentFileError
-            The binary does not export it.
-        """
+        """Return a function by name; ComponentFileError if the binary does not export it."""
         try:
             found = self._handle[name]  # a function object of our own; attributes of the handle are shared
         except AttributeError as error:

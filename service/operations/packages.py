@@ -21,13 +21,7 @@ class ServiceOperation(Operation):
     needs: ClassVar[tuple[str, ...]] = ("httpx",)
 
     def carry_out(self, **how: Any) -> None:
-        """Call the function that the operation names, once the packages are there.
-
-        Raises
-        ------
-        UsageError
-            A package is missing; nothing of the service was imported yet.
-        """
+        """Call the function that the operation names; raise UsageError first, if a package is missing."""
         missing = [module for module in self.needs if find_spec(module) is None]
         if missing:
             raise UsageError(
