@@ -11,7 +11,6 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
-from starlette.routing import Match
 
 from vibroimpact.service.passing import FULL, SHORT
 
@@ -20,7 +19,6 @@ _HELD_DATABASE = ("SQLITE_BUSY", "SQLITE_LOCKED")
 _SHORT_DATABASE = ("SQLITE_CANTOPEN", "SQLITE_NOMEM", "SQLITE_IOERR_NOMEM")
 RETRY_HELD = 2
 """Seconds after which a client may ask again that found the database held, or the machine short of something."""
-METHODS = ("GET", "POST", "DELETE")
 MEDIA_TYPE = "application/problem+json"
 MOST_PROBLEMS = 50
 """Problems that one answer lists; the client mends these first."""
@@ -91,16 +89,6 @@ def why_later(error: Exception) -> str:
     if is_full(error):
         return "waits for room on the disk"
     return "waits for free files and memory of the machine" if is_short(error) else ""
-
-
-def allowed_methods(request: Request) -> list[str]:
-    """Return the methods that some route of an application takes at the path of a request."""
-    scope, found = dict(request.scope), set[str]()
-    for method in METHODS:
-        scope["method"] = method
-        if any(route.matches(scope)[0] == Match.FULL for route in request.app.routes):
-            found.add(method)
-    return sorted(found)
 
 
 def answer_problems(app: FastAPI) -> None:

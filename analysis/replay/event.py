@@ -15,7 +15,6 @@ from vibroimpact.analysis.replay.spectra import FEWEST_SAMPLES, dominant_frequen
 from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 HEAD_SHARE, HEAD_FEWEST = 0.02, 16
 """Samples at the start from which the noise is taken: this share of the record, and at least so many."""

@@ -17,8 +17,6 @@ from vibroimpact.fmus.errors import UsageError
 
 MOST_MODES = 8
 MOST_CONTACTS = 2
-LEAST_ROOM = 4096
-"""Rows that there must be room for."""
 
 CHOICE = "VIBROIMPACT_INSTRUCTIONS"
 
