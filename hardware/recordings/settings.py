@@ -18,12 +18,10 @@ from pydantic import (
 )
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.hardware.formats.labels import is_known_unit
+from vibroimpact.hardware.toml_files import document_of, text_of
 from vibroimpact.orchestrator.scene.fields import Rule
-from vibroimpact.orchestrator.scene.problems import lines_of, problems_of, syntax_problem
-
-_LARGEST = 2**16
+from vibroimpact.orchestrator.scene.problems import lines_of, problems_of
 
 
 def _listed(value: Any) -> Any:
@@ -152,17 +150,5 @@ def read_settings(path: Path) -> ImportSettings:
     UsageError
         It cannot be read, is no TOML, or has wrong keys: all problems.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST + 1)
-        text = content.decode("utf-8-sig")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or "it is no UTF-8 text"
-        raise UsageError(f"{path}: expected a settings file (TOML), got none: {reason}.") from problem
-    if len(content) > _LARGEST:
-        raise UsageError(f"{path}: expected a settings file of at most {_LARGEST} bytes, got a larger one.")
-    try:
-        document = parse_toml(text)
-    except ValueError as problem:
-        raise UsageError(syntax_problem(problem, text).line(str(path))) from None
-    return checked(document, str(path))
+    source = str(path)
+    return checked(document_of(text_of(path, "a settings file"), source), source)

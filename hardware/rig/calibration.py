@@ -13,15 +13,13 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fin
 
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.hardware.formats.labels import is_known_unit
 from vibroimpact.hardware.rig.inputs import Input
+from vibroimpact.hardware.toml_files import document_of, text_of
 from vibroimpact.orchestrator.scene.fields import Rule
-from vibroimpact.orchestrator.scene.problems import Problem, lines_of, read_table, syntax_problem
+from vibroimpact.orchestrator.scene.problems import Problem, lines_of, read_table
 
 Floats = NDArray[np.float64]
-
-_LARGEST = 2**16
 
 
 def _as_text(value: Any) -> Any:
@@ -120,7 +118,7 @@ def read_calibrations(paths: Iterable[Path], inputs: Sequence[Input]) -> dict[st
     found: dict[str, Calibration] = {}
     known = {each.name: each for each in inputs}
     for path in paths:
-        document = _document(path)
+        document = document_of(text_of(path, "a calibration"), str(path))
         problems: list[Problem] = []
         for name, table in document.items():
             if name not in known:
@@ -139,16 +137,3 @@ def read_calibrations(paths: Iterable[Path], inputs: Sequence[Input]) -> dict[st
         if problems:
             raise UsageError("\n".join(lines_of(problems, str(path))))
     return found
-
-
-def _document(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST).decode("utf-8-sig")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or "it is no UTF-8 text"
-        raise UsageError(f"{path}: expected a calibration (TOML), got none: {reason}.") from problem
-    try:
-        return parse_toml(text)
-    except ValueError as problem:
-        raise UsageError(syntax_problem(problem, text).line(str(path))) from None

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.hardware.toml_files import document_of, text_of
 from vibroimpact.hardware.virtual_rig.wiring import Wiring, wiring_of
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.problems import (
@@ -16,11 +16,9 @@ from vibroimpact.orchestrator.scene.problems import (
     lines_of,
     quoted,
     read_table,
-    syntax_problem,
     unknown_key,
 )
 
-_LARGEST = 2**16
 TABLES = ("rig", "wiring")
 WORST_CLOCK = 1e4
 """Error of an input clock, ppm."""
@@ -76,19 +74,7 @@ def read_rig(path: Path) -> RigSettings:
     UsageError
         It cannot be read, is no TOML, or describes no rig: all problems, a line for each.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST + 1)
-        text = content.decode("utf-8-sig")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or "it is no UTF-8 text"
-        raise UsageError(f"{path}: expected the file of a rig (TOML), got none: {reason}.") from problem
-    if len(content) > _LARGEST:
-        raise UsageError(f"{path}: expected the file of a rig (TOML), got one of more than {_LARGEST} bytes.")
-    try:
-        document = parse_toml(text)
-    except ValueError as problem:
-        raise UsageError(syntax_problem(problem, text).line(str(path))) from None
+    document = document_of(text_of(path, "the file of a rig"), str(path))
     problems: list[Problem] = []
     rig, wiring = _tables(document, problems)
     if problems or rig is None or wiring is None:

@@ -14,21 +14,21 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vibroimpact.analysis.dataset import Direction
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.hardware.programs.sweep.frequencies import frequencies_of
 from vibroimpact.hardware.recordings.naming import channel_name
 from vibroimpact.hardware.rig.inputs import MOST_INPUTS, Input
+from vibroimpact.hardware.toml_files import document_of, text_of
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     lines_of,
     quoted,
     read_table,
-    syntax_problem,
     unknown_key,
 )
 
-_LARGEST = 2**18
+_MOST_BYTES = 2**18
+"""Size of the file: it may list the frequency of each step."""
 _STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
 MOST_STEPS = 10_000
 LONGEST = 7 * 86_400.0
@@ -151,13 +151,7 @@ def read_sweep(path: Path) -> SweepSettings:
 
     UsageError has all problems, a line for each: it cannot be read, is no TOML, or describes no sweep.
     """
-    try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST).decode("utf-8-sig")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or "it is no UTF-8 text"
-        raise UsageError(f"{path}: expected the file of a sweep (TOML), got none: {reason}.") from problem
-    return parse_sweep(text, str(path))
+    return parse_sweep(text_of(path, "the file of a sweep", _MOST_BYTES), str(path))
 
 
 def parse_sweep(text: str, source: str) -> SweepSettings:
@@ -165,12 +159,8 @@ def parse_sweep(text: str, source: str) -> SweepSettings:
 
     UsageError has all problems, a line for each.
     """
-    try:
-        document = parse_toml(text)
-    except ValueError as problem:
-        raise UsageError(syntax_problem(problem, text).line(source)) from None
     problems: list[Problem] = []
-    settings = _settings(document, text, source, problems)
+    settings = _settings(document_of(text, source), text, source, problems)
     if settings is not None and not problems:
         problems += _misfits(settings)
     if problems or settings is None:
