@@ -21,19 +21,26 @@ _SMALLEST = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Backbone:
-    """Amplitude, frequency and damping of successive windows of a decay; each has shape (window,)."""
+    """Amplitude, frequency and damping of successive windows of a decay.
+
+    Attributes
+    ----------
+    time, amplitude : ndarray of float, shape (window,)
+        Middle of the window, s, and the amplitude there, unit of the samples.
+    angular_frequency, angular_frequency_error : ndarray of float, shape (window,)
+        Undamped natural angular frequency, rad/s.
+    damping_ratio, damping_ratio_error : ndarray of float, shape (window,)
+    periods : float
+        Length of a window.
+    """
 
     time: Floats
-    """Middle of the window, s."""
     amplitude: Floats
-    """In the middle, unit of the samples."""
     angular_frequency: Floats
-    """Undamped natural angular frequency, rad/s."""
     angular_frequency_error: Floats
     damping_ratio: Floats
     damping_ratio_error: Floats
     periods: float
-    """Length of a window."""
 
     def words(self, unit: str) -> str:
         """Return how the frequency changes, as a sentence: the first window against those under a tenth of it."""

@@ -23,34 +23,49 @@ _BENT = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """Turning points of a decay, both sides; arrays have shape (peak,)."""
+    """Turning points of a decay, both sides.
+
+    Attributes
+    ----------
+    number, time : ndarray of float, shape (peak,)
+        In half periods (one that is missing leaves its number out), and in s.
+    height, error : ndarray of float, shape (peak,)
+        Above the equilibrium, positive on both sides, and its standard error; unit of the samples.
+    equilibrium : float
+        Unit of the samples.
+    """
 
     number: Floats
-    """In half periods: one that is missing leaves its number out."""
     time: Floats
-    """s."""
     height: Floats
-    """Above the equilibrium, positive on both sides, unit of the samples."""
     error: Floats
-    """Standard error of the height."""
     equilibrium: float
-    """Unit of the samples."""
 
 
 @dataclass(frozen=True, slots=True)
 class Decrement:
-    """Logarithmic decrement per period, what follows from it, and the peaks it is from."""
+    """Logarithmic decrement per period, what follows from it, and the peaks it is from.
+
+    Attributes
+    ----------
+    decrement, damping_ratio : Estimate
+    angular_frequency : Estimate
+        Of the damped motion, from the times of the peaks, rad/s.
+    peaks : Peaks
+    first, last : float
+        Decrement per period at the first and the last peak, from a parabola through ln(height).
+    bent : bool
+        Whether ln(height) does not lie on a straight line: it needs the parabola, or what the line leaves is not
+        noise. Then the damping is not viscous alone.
+    """
 
     decrement: Estimate
     damping_ratio: Estimate
     angular_frequency: Estimate
-    """Of the damped motion, from the times of the peaks, rad/s."""
     peaks: Peaks
     first: float
     last: float
-    """Decrement per period at the `first` and the `last` peak, from a parabola through ln(height)."""
     bent: bool
-    """Whether ln(height) is no straight line, or a line leaves no noise: damping is not viscous alone."""
 
 
 def logarithmic_decrement(samples: DecaySamples) -> Decrement:

@@ -133,23 +133,28 @@ def _amplitudes(time: Floats, value: Floats, omega: float, decay_rate: float) ->
 
 @dataclass(frozen=True, slots=True)
 class ExponentialDecay:
-    """A fitted decaying cosine."""
+    """A fitted decaying cosine.
+
+    Attributes
+    ----------
+    amplitude, phase, offset : Estimate
+        At `reference_time` (s): unit of the samples, rad, unit of the samples.
+    angular_frequency, decay_rate : Estimate
+        Damped angular frequency omega, rad/s, and lambda, 1/s.
+    natural_angular_frequency, damping_ratio : Estimate
+        `sqrt(omega^2 + lambda^2)`, rad/s, and lambda over it.
+    fitted : ndarray of float, shape (sample,)
+    """
 
     amplitude: Estimate
     phase: Estimate
     offset: Estimate
-    """Amplitude, phase and offset at `reference_time` (s): unit of the samples, rad, unit of the samples."""
     angular_frequency: Estimate
-    """Damped angular frequency omega, rad/s."""
     decay_rate: Estimate
-    """lambda, 1/s."""
     natural_angular_frequency: Estimate
-    """`sqrt(omega^2 + lambda^2)`, rad/s."""
     damping_ratio: Estimate
-    """lambda over the natural angular frequency."""
     reference_time: float
     fitted: Floats
-    """Shape (sample,)."""
     test: ResidualTest
 
     @property

@@ -29,19 +29,25 @@ _MOST_EVALUATIONS = 60
 class LawFit:
     """A damping law with its fitted coefficients.
 
-    Their names are `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
-    `turning_time`, the terms of the law, and `cubic` where asked for.
+    Attributes
+    ----------
+    law : DampingLaw
+    coefficients : mapping of str to Estimate
+        By name: `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
+        `turning_time`, the terms of the law, and `cubic` where asked for.
+    residual_sum : float
+        Sum of squares, (unit of the samples)^2.
+    fitted : ndarray of float, shape (sample,)
+    settled : bool
+        Whether the fit ended before its limit of evaluations.
     """
 
     law: DampingLaw
     coefficients: Mapping[str, Estimate]
     residual_sum: float
-    """Sum of squares, (unit of the samples)^2."""
     fitted: Floats
-    """Shape (sample,)."""
     test: ResidualTest
     settled: bool
-    """Whether the fit ended before its limit of evaluations."""
 
     @property
     def physical(self) -> bool:

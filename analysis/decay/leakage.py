@@ -21,12 +21,18 @@ _DELAYS = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leakage:
-    """Cosine series of rho: a line shows `sum_j w_j (H(omega + j d) + H(omega - j d)) / 2`."""
+    """Cosine series of rho: a line shows `sum_j w_j (H(omega + j d) + H(omega - j d)) / 2`.
+
+    Attributes
+    ----------
+    weights : ndarray of float, shape (term,)
+        w; their sum is 1. One term: no leakage.
+    spacing : float
+        d, rad/s: half a line.
+    """
 
     weights: Floats = field(default_factory=lambda: np.ones(1))
-    """w, shape (term,); their sum is 1. One term: no leakage."""
     spacing: float = 0.0
-    """d, rad/s: half a line."""
 
     def seen(self, response: Callable[[Floats], Complexes], omega: Floats) -> Complexes:
         """Return the response that lines at `omega` (rad/s) show of a function of the angular frequency."""

@@ -19,24 +19,32 @@ _FEWEST_LAGS, _MOST_LAGS = 10, 400
 
 @dataclass(frozen=True, slots=True)
 class ResidualTest:
-    """What the residual of a fit looks like."""
+    """What the residual of a fit looks like.
+
+    Attributes
+    ----------
+    rms, noise_floor, structure : float
+        Root mean square of the residual; of its white part, from second differences; of the rest.
+    relative_structure : float
+        The structure as a fraction of the largest excursion of the measured motion.
+    lags : int
+        Lags of the Ljung-Box test.
+    portmanteau_probability : float
+        That white noise shows such autocorrelations (Ljung-Box).
+    runs_probability : float
+        That white noise changes its sign so rarely, or so often (Wald-Wolfowitz, two-sided).
+    effective_samples : float
+        Independent samples that say as much about the oscillation as these do.
+    """
 
     rms: float
-    """Root mean square of the residual."""
     noise_floor: float
-    """Root mean square of its white part, from second differences."""
     structure: float
-    """Root mean square of the rest."""
     relative_structure: float
-    """The structure as a fraction of the largest excursion of the measured motion."""
     lags: int
-    """Lags of the Ljung-Box test."""
     portmanteau_probability: float
-    """That white noise shows such autocorrelations (Ljung-Box)."""
     runs_probability: float
-    """That white noise changes its sign so rarely, or so often (Wald-Wolfowitz, two-sided)."""
     effective_samples: float
-    """Independent samples that say as much about the oscillation as these do."""
 
     @property
     def adequate(self) -> bool:

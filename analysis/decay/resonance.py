@@ -87,23 +87,32 @@ class Resonance:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A frequency response to fit: complex where the phase is known, else real magnitudes; arrays of shape (line,)."""
+    """A frequency response to fit: complex where the phase is known, else real magnitudes.
+
+    Attributes
+    ----------
+    angular_frequency : ndarray of float, shape (line,)
+        rad/s.
+    response : ndarray of complex or float, shape (line,)
+    error : ndarray of float, shape (line,)
+        Standard error of each real part; zeros where not known.
+    form, unit : str
+        One of `FORMS`; CF unit of C.
+    leakage : Leakage
+        What the lines show of the response.
+    estimator : {"h1", "h2"}
+    common : float
+        Lines that are worth one.
+    """
 
     angular_frequency: Floats
-    """rad/s."""
     response: Floats | Complexes
     error: Floats
-    """Standard error of each real part; zeros where not known."""
     form: str = "displacement"
-    """One of `FORMS`."""
     unit: str = "1"
-    """CF unit of C."""
     leakage: Leakage = NO_LEAKAGE
-    """What the lines show of the response."""
     estimator: str = "h1"
-    """`h1` or `h2`."""
     common: float = 1.0
-    """Lines that are worth one."""
 
     @property
     def complex(self) -> bool:

@@ -29,14 +29,21 @@ _PARAMETERS = 10
 
 @dataclass(frozen=True, slots=True)
 class SecondOscillation:
-    """What a second decaying cosine leaves."""
+    """What a second decaying cosine leaves.
+
+    Attributes
+    ----------
+    angular_frequency : float
+        rad/s.
+    amplitude : float
+        Unit of the samples, at the first sample.
+    aic : float
+        Akaike's criterion of both cosines together, for white residuals.
+    """
 
     angular_frequency: float
-    """rad/s."""
     amplitude: float
-    """Unit of the samples, at the first sample."""
     aic: float
-    """Akaike's criterion of both cosines together, for white residuals."""
 
     def better_than(self, aic: float) -> bool:
         """Tell whether two cosines describe the decay better than a fit of this criterion."""

@@ -103,25 +103,39 @@ class Doubt:
 
 @dataclass(frozen=True, slots=True)
 class FittedMotion:
-    """What was measured, and the motion of a method that fits it best."""
+    """What was measured, and the motion that fits it best.
+
+    Attributes
+    ----------
+    time, measured, fitted : ndarray, shape (sample,)
+        s, unit of the channel; NaN where nothing was fitted.
+    method : str
+        Whose motion it is.
+    """
 
     time: Floats
     measured: Floats
     fitted: Floats
-    """`measured` and `fitted`: shape (sample,), unit of the channel; NaN where nothing was fitted."""
     method: str
 
 
 @dataclass(frozen=True, slots=True)
 class RestitutionOfSpeed:
-    """A restitution that changes with the speed of approach, at the speeds of the impacts; each has shape (bounce,)."""
+    """A restitution that changes with the speed of approach, at the speeds of the impacts.
+
+    Attributes
+    ----------
+    speed : ndarray, shape (bounce,)
+        Unit of the channel per s.
+    single : ndarray, shape (bounce,)
+        Ratio at each impact alone.
+    fitted, low, high : ndarray, shape (bounce,)
+        r(v) and the ends of its interval.
+    """
 
     speed: Floats
-    """Unit of the channel per s."""
     single: Floats
-    """Ratio at each impact alone."""
     fitted: Floats
-    """r(v); `low` and `high` are the ends of its interval."""
     low: Floats
     high: Floats
 

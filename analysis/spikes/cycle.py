@@ -36,18 +36,27 @@ _REFINEMENTS = 5
 
 @dataclass(frozen=True, slots=True)
 class PeriodicPart:
-    """The periodic part of a signal, or why there is none."""
+    """The periodic part of a signal, or why there is none.
+
+    Attributes
+    ----------
+    period : float
+        Samples; 0 where nothing repeats.
+    periodic : ndarray of float, shape (sample,)
+        The periodic part, about the signal's own mean level; zeros where there is none.
+    count : int
+        Cycles in the signal.
+    left : float
+        Noise without the periodic part, as a part of the noise with it.
+    reason : str
+        Why it is an excitation or why not, in words.
+    """
 
     period: float
-    """Samples; 0 where nothing repeats."""
     periodic: Floats
-    """About the signal's own mean level, shape (sample,); zeros where there is none."""
     count: int
-    """Cycles in the signal."""
     left: float
-    """Noise without the periodic part, as a part of the noise with it."""
     reason: str
-    """Why it is an excitation or why not, in words."""
 
     @property
     def found(self) -> bool:

@@ -24,19 +24,26 @@ _BEATS, _BEATS_BELOW = 0.5, 0.1
 
 @dataclass(frozen=True, slots=True)
 class Excursions:
-    """Stretches in which a statistic passed a threshold, in order; each has shape (excursion,)."""
+    """Stretches in which a statistic passed a threshold, in order.
+
+    Attributes
+    ----------
+    first, last : ndarray of int, shape (excursion,)
+        First and last sample above the lower threshold.
+    up, down : ndarray of float, shape (excursion,)
+        First upward and last downward crossing of the threshold, s, linear between samples.
+    peak : ndarray of float, shape (excursion,)
+        Largest value of the statistic.
+    samples : ndarray of int, shape (excursion,)
+        Samples above the threshold.
+    """
 
     first: Indices
     last: Indices
-    """`first` and `last` sample above the lower threshold."""
     up: Floats
-    """First upward crossing of the threshold, s, linear between samples."""
     down: Floats
-    """Last downward crossing, likewise."""
     peak: Floats
-    """Largest value of the statistic."""
     samples: Indices
-    """Samples above the threshold."""
 
     def __len__(self) -> int:
         """Return the number of excursions."""

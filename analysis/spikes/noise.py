@@ -63,14 +63,21 @@ _MOST_BEYOND = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """The noise of a record and the threshold that follows from it."""
+    """The noise of a record and the threshold that follows from it.
+
+    Attributes
+    ----------
+    sigma : float
+        Robust standard deviation of the noise, in units of the signal.
+    shape : float
+        Shape of the tail, with one standard error added where it is positive.
+    threshold : float
+        What noise passes `false_alarms` times in a record like this.
+    """
 
     sigma: float
-    """Robust standard deviation of the noise, in units of the signal."""
     shape: float
-    """Shape of the tail, with one standard error added where it is positive."""
     threshold: float
-    """What noise passes `false_alarms` times in a record like this."""
 
 
 def half_wave_peaks(values: Floats) -> Floats:

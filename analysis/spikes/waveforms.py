@@ -82,20 +82,23 @@ WAVEFORMS = {
 
 @dataclass(frozen=True, slots=True)
 class WaveformFit:
-    """One curve fitted to every pulse; each has shape (spike,).
+    """One curve fitted to every pulse.
 
-    A pulse of fewer samples than its three unknowns ask for has NaN.
+    Attributes
+    ----------
+    peak, middle, length : ndarray of float, shape (spike,)
+        SI unit, s, s; NaN for a pulse of fewer samples than its three unknowns ask for.
+    goodness : ndarray of float, shape (spike,)
+        1 - (squares of the residual) / (squares about the mean) within the pulse.
+    squares : ndarray of float, shape (spike,)
+        Mean square of the residual, SI unit squared.
     """
 
     peak: Floats
-    """SI unit."""
     middle: Floats
     length: Floats
-    """Middle and length, s."""
     goodness: Floats
-    """1 - (squares of the residual) / (squares about the mean) within the pulse."""
     squares: Floats
-    """Mean square of the residual, SI unit squared."""
 
 
 def fit_waveforms(pulses: list[tuple[Floats, Floats]], levels: Floats) -> dict[str, WaveformFit]:

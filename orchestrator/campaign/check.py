@@ -37,24 +37,36 @@ COPIES_IN_RUN, COPIES_IN_CAMPAIGN = 4, 2
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One point of a scene, computed."""
+    """One point of a scene, computed.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        What it has of the swept keys: of each axis the value in the middle.
+    outcome : Outcome
+        Likewise `timeout` where it was given up after `MOST_TRIAL_SECONDS`.
+    message : str
+        Why it ended so.
+    seconds : float
+        Wall time, s.
+    impacts : int
+        Number of recorded impacts.
+    size : int
+        Bytes of what was recorded.
+    given_up : bool
+        Whether it was ended here, and not by a deadline of the scene.
+    lane_seconds : float or None
+        Wall time of one of many points of the sweep that run at once, where they do, s.
+    """
 
     values: Mapping[str, float]
-    """What it has of the swept keys: of each axis the value in the middle."""
     outcome: Outcome
-    """Likewise `timeout` where it was given up after `MOST_TRIAL_SECONDS`."""
     message: str
-    """Why it ended so."""
     seconds: float
-    """Wall time, s."""
     impacts: int
-    """Number of recorded impacts."""
     size: int
-    """Bytes of what was recorded."""
     given_up: bool
-    """Whether it was ended here, and not by a deadline of the scene."""
     lane_seconds: float | None = None
-    """Wall time of one of many points of the sweep that run at once, where they do, s."""
 
     @property
     def seconds_of_a_point(self) -> float:
