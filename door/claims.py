@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.given import PathLike, given_result
-from vibroimpact.orchestrator.hard_cases import dataset_of, measured_cases
+from vibroimpact.orchestrator.hard_cases.study import MeasuredCases
+from vibroimpact.returned import of_study
 
 
 def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> xr.Dataset:
@@ -39,7 +39,4 @@ def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> 
     (0.0, True)
     """
     target = given_result(path, [])
-    found = dataset_of(measured_cases([only] if isinstance(only, str) else only))
-    if target is not None:
-        write_results(found, target, kind="hard_cases")
-    return found
+    return of_study(MeasuredCases([only] if isinstance(only, str) else only), target)

@@ -7,27 +7,17 @@ from typing import Any
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset import marked, open_dataset, write_dataset
-from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.analysis.orbits.feedback import Law
-from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
-from vibroimpact.orchestrator.orbits.basins import (
-    POINTS,
-    Plane,
-    Span,
-    basins_dataset,
-    prepare_basins,
-    run_basins,
-)
-from vibroimpact.orchestrator.orbits.control import run_plan
+from vibroimpact.orchestrator.orbits.basins import POINTS, BasinsOfScene, Plane, Span
+from vibroimpact.orchestrator.orbits.control import Controlled
 from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
 from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
-from vibroimpact.orchestrator.orbits.follow import Followed, FollowedLoci, follow_branches, follow_loci
-from vibroimpact.orchestrator.orbits.maps import map_of, settings_of
-from vibroimpact.returned import ONE_AT_A_TIME
+from vibroimpact.orchestrator.orbits.follow import Following
+from vibroimpact.orchestrator.orbits.maps import MapOfScene, settings_of
+from vibroimpact.returned import of_study, runs_of_study
 
 
 def find_orbits(
@@ -143,27 +133,14 @@ def follow(
     alone = chosen.unswept(varied=[parameter])
     if (second is None) != (second_range is None):
         raise UsageError("follow: second: expected a key and its range together, got one of them.")
-    followed = follow_branches(
-        alone,
-        parameter,
-        start,
-        stop,
-        impacts=impacts,
-        periods=periods,
-        seed=seed,
+    study = Following(
+        *(alone, parameter, start, stop, impacts, periods, seed),
         doublings=doublings,
-        longest=step,
+        step=step,
+        second=second,
+        second_range=second_range,
     )
-    result: Followed | FollowedLoci = followed
-    if second is not None and second_range is not None:
-        ranges = [FollowSettings(min(ends), max(ends), step) for ends in ((start, stop), second_range)]
-        loci = follow_loci(FollowedLoci(followed, second), *ranges)
-        result = loci if loci.loci else followed
-    if written is None:
-        return opened_in_memory(marked(result.dataset))
-    with ONE_AT_A_TIME:
-        write_dataset(result.dataset, written)
-        return open_dataset(written)
+    return runs_of_study(study, written)
 
 
 def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:
@@ -194,7 +171,7 @@ def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -
         The body has several modes, where the map is one of one mode.
     """
     settings = settings_of(kind, **options)
-    return map_of(None if scene is None else given_scene(scene), settings)
+    return of_study(MapOfScene(None if scene is None else given_scene(scene), settings))
 
 
 def basins(
@@ -232,10 +209,7 @@ def basins(
     UsageError
         The scene has no such orbits, or the plane no starts.
     """
-    plane = Plane(x, y, points, number)
-    alone, across, along, found = prepare_basins(given_scene(scene), plane)
-    run_basins(alone, found)
-    return basins_dataset(alone, plane, across, along, found)
+    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number)))
 
 
 def control(
@@ -295,4 +269,4 @@ def control(
         pythonfmu is not installed.
     """
     settings = ControlSettings(law, step, tolerance, limit, noise, seed, periods, stay)
-    return run_plan(control_plan(given_scene(scene), start, stop, settings)).dataset
+    return of_study(Controlled(control_plan(given_scene(scene), start, stop, settings)))

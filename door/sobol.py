@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
-from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
+from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES
+from vibroimpact.analysis.sensitivity.report import SensitivityOfCampaign
 from vibroimpact.given import PathLike, given_path, given_result
+from vibroimpact.returned import of_study
 
 
 def sensitivity(
@@ -56,7 +57,4 @@ def sensitivity(
     target = given_result(path, [dataset])
     opened = dataset if isinstance(dataset, xr.Dataset) else open_dataset(given_path(dataset))
     names = [of] if isinstance(of, str) else list(of)
-    found = sensitivity_report(opened, names, level=level, resamples=resamples, seed=seed)
-    if target is not None:
-        write_results(found, target, kind="sensitivity")
-    return found
+    return of_study(SensitivityOfCampaign(opened, names, level, resamples, seed), target)

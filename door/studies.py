@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene, scene_with_modes
-from vibroimpact.orchestrator.study.accuracy import BUDGET, dataset_of, refuse_unreached, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import BUDGET, AccuracyOfScene, refuse_unreached
 from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
-from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
+from vibroimpact.orchestrator.study.cost_of_effects import CostOfEffects
+from vibroimpact.returned import of_study
 
 
 def accuracy(
@@ -56,12 +56,10 @@ def accuracy(
     refuse_misuse(tolerance, of, budget)
     chosen = given_scene(scene)
     target = given_result(path, [scene, chosen])
-    study = study_accuracy(scene_with_modes(chosen), tolerance=tolerance, quantity=of, budget=budget)
-    dataset = dataset_of(study)
-    if target is not None:
-        write_results(dataset, target, kind="accuracy")
-    refuse_unreached(study)
-    return dataset
+    study = AccuracyOfScene(scene_with_modes(chosen), tolerance, of, budget)
+    found = of_study(study, target)
+    refuse_unreached(study.comparison)
+    return found
 
 
 def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
@@ -95,9 +93,4 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     """
     chosen = given_scene(scene)
     target = given_result(path, [scene, chosen])
-    chosen = scene_with_modes(chosen)
-    alone = chosen.unswept()
-    dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
-    if target is not None:
-        write_results(dataset, target, kind="effects")
-    return dataset
+    return of_study(CostOfEffects(scene_with_modes(chosen)), target)

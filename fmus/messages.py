@@ -140,3 +140,38 @@ def typed(text: Part) -> str:
 
 def _called(part: Part) -> str:
     return part if isinstance(part, str) else part.called
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "run"), counted(3, "run")
+    ('1 run', '3 runs')
+    """
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+_DURATIONS = (
+    (1e-3, "us", 1e6),
+    (1.0, "ms", 1e3),
+    (120.0, "s", 1.0),
+    (7200.0, "min", 1 / 60),
+    (172800.0, "h", 1 / 3600),
+)
+"""Wall times below which a unit is used, s; its name, and how many of it are a second."""
+
+
+def duration(seconds: float) -> str:
+    """Return a wall time as a person reads it, with two digits.
+
+    >>> duration(2.34e-3), duration(59.6), duration(5000.0), duration(4e6)
+    ('2.3 ms', '60 s', '83 min', '46 days')
+    """
+    for below, unit, factor in _DURATIONS:
+        if seconds < below:
+            return f"{_two_digits(seconds * factor)} {unit}"
+    return f"{_two_digits(seconds / 86400)} days"
+
+
+def _two_digits(number: float) -> str:
+    return f"{number:.0f}" if number >= 9.95 else f"{number:.2g}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import FastAPI, Response
 from fastapi.responses import PlainTextResponse
 
-from vibroimpact.orchestrator.run.provenance import versions
+from vibroimpact.analysis.dataset.provenance import versions
 from vibroimpact.service.metrics import CONTENT_TYPE, exposition
 from vibroimpact.service.page_api import page_routes
 from vibroimpact.service.page_files import serve_page

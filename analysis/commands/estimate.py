@@ -15,8 +15,7 @@ from vibroimpact.analysis.commands.estimate_scene import (
     refuse_numbers,
     side_of_stop,
 )
-from vibroimpact.analysis.commands.found import refuse_places
-from vibroimpact.analysis.dataset.outputs import writing
+from vibroimpact.analysis.dataset.outputs import refuse_places, writing
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.dataset.schema import scene_of

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.commands.found import refuse_places
-from vibroimpact.analysis.dataset.outputs import writing
+from vibroimpact.analysis.dataset.outputs import refuse_places, writing
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.intervals import interval_report, print_intervals, seams
 from vibroimpact.analysis.operations.spikes import Spikes

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.fmus.errors import UsageError
@@ -130,6 +130,44 @@ def refuse_overwriting(
         f"{output}: expected a new file, or one that holds the same, got one that holds something else. "
         "Choose another name, or overwrite it with --force."
     )
+
+
+class Places(Protocol):
+    """What operations with results declare: dataset, figure, and whether other files may be replaced."""
+
+    @property
+    def output(self) -> Path | None:
+        """Dataset to write."""
+
+    @property
+    def figure(self) -> Path | None:
+        """Figure to write."""
+
+    @property
+    def force(self) -> bool:
+        """Whether a file that holds something else is replaced."""
+
+
+def refuse_places(options: Places, read: Iterable[Path], **same: object) -> None:
+    """Refuse places where results cannot be written, or where something else is.
+
+    Parameters
+    ----------
+    read : iterable of Path
+        Files that are read, and not written over.
+    **same : object
+        Attributes by which a dataset that is there counts as made by the same command before.
+
+    Raises
+    ------
+    UsageError
+    """
+    refuse_outputs(list(read), options.output, options.figure)
+
+    def is_the_same(there: Mapping[str, Any]) -> bool:
+        return all(there.get(name) == value for name, value in same.items())
+
+    refuse_overwriting(options.output, options.force, is_the_same)
 
 
 @contextmanager

@@ -134,7 +134,7 @@ def _rule(name: str, dims: str, unit: str, words: str, of: str = "") -> Variable
     return VariableRule(name, tuple(dims.split()), unit, words, object if of == "text" else None)
 
 
-def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:
+def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str = "") -> None:
     """Write the dataset of an analysis.
 
     Parameters
@@ -144,15 +144,19 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
     path : path
         An older file of this name is replaced only when the new one is complete.
     kind : str
-        What it is (`spikes`, `estimates`, `replay`, ...), by which `vibroimpact plot` knows how to draw it.
+        What it is (`spikes`, `estimates`, `replay`, ...), by which `vibroimpact plot` knows how to draw it; its own
+        attribute `results_kind` unless it is said.
 
     Raises
     ------
     DatasetError
-        A variable has no unit or no name in words.
+        It has no kind, or a variable has no unit or no name in words.
     OSError
         The file cannot be written, with the reason of the operating system.
     """
+    kind = kind or dataset.attrs.get("results_kind", "")
+    if not kind:
+        raise DatasetError("results: expected a kind, got none. Name one, or use the dataset of a study.")
     problems = [
         f"{kind}: {name}: expected the attribute {key}, got none."
         for name, variable in dataset.variables.items()

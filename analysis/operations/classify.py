@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Positional, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Positional, study
 
 
-@operation("analysis.commands.classify:show_classes", Door("classify", without=("output",)))
+@study("analysis.orbits.classify:ClassesOfDataset", Door("classify", without=("output",)))
 class Classify(Operation):
     """Say what each run of a dataset is: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
 

@@ -13,14 +13,14 @@ from vibroimpact.fmus.operations import (
     Operation,
     Option,
     Positional,
-    operation,
+    study,
 )
 
-#: Of the intervals of Sobol indices: `sensitivity.report` has the same, and takes long to load.
+#: Of the intervals of Sobol indices.
 LEVEL, RESAMPLES = 0.95, 1000
 
 
-@operation("analysis.commands.sensitivity:show_sensitivity", Door("sensitivity"))
+@study("analysis.sensitivity.report:SensitivityOfCampaign", Door("sensitivity"))
 class Sensitivity(Operation):
     """Say how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
 

@@ -7,7 +7,7 @@ starts, then of some of those that come near to none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol
 
@@ -120,9 +120,6 @@ class Attractor:
         return self.kind.name if self.is_one else "chaotic, not told apart"
 
 
-Told = Callable[["Basins"], None]
-
-
 @dataclass(eq=False)
 class Basins:
     """Starts and where they end.
@@ -189,8 +186,8 @@ def _letter(place: int) -> str:
     return letters
 
 
-def find_basins(basins: Basins, flow: Flow, *, block: int, seed: int = 1, told: Told | None = None) -> None:
-    """Find where the undecided starts end; `basins` grows meanwhile, and keeps what Ctrl-C leaves.
+def find_basins(basins: Basins, flow: Flow, *, block: int, seed: int = 1) -> Generator[Basins, None, None]:
+    """Find where the undecided starts end; yield `basins`, which grow, after each block.
 
     Parameters
     ----------
@@ -200,35 +197,30 @@ def find_basins(basins: Basins, flow: Flow, *, block: int, seed: int = 1, told: 
         Starts that are followed by one call.
     seed : int
         Of the starts of which long runs tell the attractors.
-    told : callable, optional
-        Called after each block.
     """
-    search = _Search(basins, flow, block, np.random.default_rng(seed), told)
-    search.run()
+    yield from _Search(basins, flow, block, np.random.default_rng(seed)).blocks()
 
 
 class _Search:
-    def __init__(
-        self, basins: Basins, flow: Flow, block: int, draw: np.random.Generator, told: Told | None
-    ) -> None:
-        self._basins, self._flow, self._block = basins, flow, block
-        self._draw, self._told = draw, told
+    def __init__(self, basins: Basins, flow: Flow, block: int, draw: np.random.Generator) -> None:
+        self._basins, self._flow, self._block, self._draw = basins, flow, block, draw
         self._now = basins.starts.copy()
         self._lost = np.zeros(len(self._now), np.bool_)
         # of chaotic runs: their features, groups, and the number of each group's attractor
         self._features = np.empty((0, 0))
         self._groups, self._numbers = NO_GROUPS, np.empty(0, np.int16)
 
-    def run(self) -> None:
+    def blocks(self) -> Generator[Basins, None, None]:
+        """Follow block after block."""
         self._look(self._left(), FIRST_SAMPLE, first=True)
+        yield self._basins
         passed = 0
         for periods in ROUNDS:
             if not self._left().size:
                 return
             for places in self._blocks():
                 self._follow(places, periods, first=passed == 0)
-                if self._told is not None:
-                    self._told(self._basins)
+                yield self._basins
             passed += periods
             if passed in LOOKS:
                 self._look(self._left(), LATER_SAMPLE)

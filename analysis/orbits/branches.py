@@ -229,3 +229,10 @@ def _special(branches: Sequence[Branch], orbit: BranchOrbit) -> SpecialOrbit:
             if point.at.orbit is orbit.orbit:
                 return SpecialOrbit[point.kind.replace(" ", "_")]
     return SpecialOrbit.none
+
+
+def multiplier_text(value: complex) -> str:
+    """Return a Floquet multiplier in words."""
+    if not np.isfinite(value):
+        return "unbounded"
+    return f"{value.real:.6g}" if value.imag == 0.0 else f"{value.real:.6g}{value.imag:+.6g}i"

@@ -1,4 +1,4 @@
-"""The class of each run of a dataset: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+"""The study `classify`: each run is P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
 
 A run shows its state once in each forcing period. A motion repeats after q periods where the distance between states q
 periods apart is 0, or goes to 0: a slow transient of a multiplier near -1 alternates for long, but its distances shrink
@@ -9,25 +9,32 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset import dataset_file, open_dataset, read_flat
 from vibroimpact.analysis.dataset.accessor import run_ids
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
+from vibroimpact.analysis.operations.classify import Classify
 from vibroimpact.analysis.orbits.impact_classes import (
     has_named_contacts,
     impacts_of_runs,
     own_period,
     states_of_periods,
 )
+from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.html_view import html_table
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import wide_terminal
 
 Floats = NDArray[np.float64]
 
@@ -111,6 +118,103 @@ class ClassesOfRuns(list[RunClass]):
         return html_table(f"Classes of {len(self)} runs", ("class", "runs", "why"), rows)
 
 
+@dataclass(eq=False)
+class ClassesOfDataset(Study[RunClass]):
+    """The classes of the runs of a dataset; a row is the class of a run.
+
+    Parameters
+    ----------
+    runs : xarray.Dataset
+        As `open_dataset` gives it.
+    file : path, optional
+        Its file.
+    """
+
+    name = "classify"
+    nothing = "a class"
+    named = (DatasetError,)
+    mark = "classified_from"
+    figure = "classes"
+
+    runs: xr.Dataset
+    file: Path | None = None
+
+    @classmethod
+    def reads(cls, options: Classify) -> Sequence[Path]:
+        """Return the file of the dataset."""
+        return [dataset_file(options.file)]
+
+    @classmethod
+    def marks(cls, options: Classify) -> Mapping[str, Any]:
+        """Return the path of the dataset."""
+        return {cls.mark: str(options.file)}
+
+    @classmethod
+    def same(cls, options: Classify) -> Mapping[str, Any]:
+        """Return the path of the dataset: that of classes is one of runs."""
+        return cls.marks(options)
+
+    @classmethod
+    def prepare(cls, options: Classify, stack: ExitStack) -> Self:
+        """Open the dataset."""
+        file = dataset_file(options.file)
+        return cls(stack.enter_context(open_dataset(file)), file)
+
+    def rows(self) -> Generator[RunClass, None, None]:
+        """Classify run after run.
+
+        Raises
+        ------
+        DatasetError
+            The dataset has one value for all periods, or neither strobe nor extrema.
+        """
+        runs = self.runs.vibroimpact.runs
+        columns = [name for name in _STATES if name in runs.variables]
+        if not columns and has_named_contacts(self.runs):
+            for each, end in zip(impacts_of_runs(self.runs), runs["outcome"].values, strict=True):
+                yield _by_impacts(*each, Outcome(int(end)))
+            return
+        if not columns:
+            raise DatasetError(
+                "classify: expected strobe or extrema in the dataset, got neither. Record them."
+            )
+        for name in columns:
+            if runs[name].attrs.get("long_name") == OF_ALL_PERIODS.get(name, ""):
+                raise DatasetError(
+                    "classify: expected values of each period, got one for all. Run with each_period."
+                )
+        states = np.stack([np.atleast_2d(runs[name].values) for name in columns], axis=-1)
+        counts = runs["impacts_per_period"].values if "impacts_per_period" in runs.variables else None
+        sticks = runs["stick_count"].values if "stick_count" in runs.variables else np.zeros(len(states))
+        outcomes = runs["outcome"].values
+        for run in range(len(states)):
+            yield class_of(
+                states[run],
+                None if counts is None else counts[run],
+                Outcome(int(outcomes[run])),
+                bool(sticks[run] > 0),
+            )
+
+    @property
+    def classes(self) -> ClassesOfRuns:
+        """The class of each run; those that were not looked at are unknown."""
+        left = self.runs.vibroimpact.runs.sizes["run"] - len(self.found)
+        unknown = RunClass(OrbitClass.unknown, reason=f"not looked at: {self.incomplete}")
+        return ClassesOfRuns([*self.found, *[unknown] * left], self.runs)
+
+    def made(self) -> xr.Dataset:
+        """Return the runs of the file with their classes, one-dimensional."""
+        assert self.file is not None
+        return with_classes(read_flat(self.file), self.classes, self.runs.attrs["units_system"])
+
+    def print_results(self) -> None:
+        """Print how many runs there are of each class."""
+        rows = table("Classes of the runs", "<class", ">runs", "<why")
+        for (name, reason), count in Counter((each.name, each.reason) for each in self.classes).most_common():
+            rows.add_row(name, f"{count}", reason)
+        wide_terminal().print(rows)
+
+
 def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     """Return the class of each run, in the order of the file.
 
@@ -131,32 +235,7 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     DatasetError
         The dataset has one value for all periods, or neither strobe nor extrema.
     """
-    runs = dataset.vibroimpact.runs
-    columns = [name for name in _STATES if name in runs.variables]
-    if not columns and has_named_contacts(dataset):
-        told = zip(impacts_of_runs(dataset), runs["outcome"].values, strict=True)
-        return ClassesOfRuns((_by_impacts(*each, Outcome(int(end))) for each, end in told), dataset)
-    if not columns:
-        raise DatasetError("classify: expected strobe or extrema in the dataset, got neither. Record them.")
-    for name in columns:
-        if runs[name].attrs.get("long_name") == OF_ALL_PERIODS.get(name, ""):
-            raise DatasetError(
-                "classify: expected values of each period, got one for all. Run with each_period."
-            )
-    states = np.stack([np.atleast_2d(runs[name].values) for name in columns], axis=-1)
-    counts = runs["impacts_per_period"].values if "impacts_per_period" in runs.variables else None
-    sticks = runs["stick_count"].values if "stick_count" in runs.variables else np.zeros(len(states))
-    outcomes = runs["outcome"].values
-    found = (
-        class_of(
-            states[run],
-            None if counts is None else counts[run],
-            Outcome(int(outcomes[run])),
-            bool(sticks[run] > 0),
-        )
-        for run in range(len(states))
-    )
-    return ClassesOfRuns(found, dataset)
+    return whole(ClassesOfDataset(dataset)).classes
 
 
 def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) -> RunClass:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,18 +53,33 @@ def orbits_of(
     UsageError
         There are no such orbits.
     """
+    found = each_orbit(body, impacts, periods, starts=starts, penetrating=penetrating)
+    return sorted(found, key=fastest_first)
+
+
+def fastest_first(orbit: PeriodicOrbit) -> float:
+    """Return what orbits are sorted by: the negative velocity of the fastest impact."""
+    return -float(orbit.velocities.max())
+
+
+def each_orbit(
+    body: ImpactingBody, impacts: int, periods: int, *, starts: int = STARTS, penetrating: bool = False
+) -> Iterator[PeriodicOrbit]:
+    """Yield the orbits of `orbits_of` as they are found."""
     if not (1 <= impacts <= MOST_IMPACTS and periods >= 1):
         raise UsageError(
             f"orbit: expected 1 to {MOST_IMPACTS} impacts in 1 or more periods, got {impacts} in {periods}."
         )
+    found: Iterator[PeriodicOrbit]
     if impacts == 1:
-        found = [
+        found = (
             orbit for contact in range(len(body.contacts)) for orbit in closed_form(body, periods, contact)
-        ]
+        )
     else:
         found = _from_starts(body, impacts, periods, starts)
-    kept = [orbit for orbit in found if orbit.turns == 1 and (penetrating or orbit.is_physical)]
-    return sorted(kept, key=lambda orbit: -float(orbit.velocities.max()))
+    for orbit in found:
+        if orbit.turns == 1 and (penetrating or orbit.is_physical):
+            yield orbit
 
 
 def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
@@ -82,7 +99,7 @@ def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     return False
 
 
-def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -> list[PeriodicOrbit]:
+def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -> Iterator[PeriodicOrbit]:
     found: list[PeriodicOrbit] = []
     for phases, contacts in _trains(impacts, periods, len(body.contacts), starts):
         try:
@@ -92,7 +109,7 @@ def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -
         hits = orbit.velocities.min() > MOST_SPEEDS * float(np.abs(orbit.velocities).max())
         if hits and not any(same_orbit(orbit, other) for other in found):
             found.append(orbit)
-    return found
+            yield orbit
 
 
 def _trains(impacts: int, periods: int, contacts: int, starts: int) -> list[tuple[Floats, NDArray[np.int32]]]:

@@ -10,9 +10,10 @@ table 2 b and f):
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from numbers import Integral, Real
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,29 +91,67 @@ def sobol_indices(
     >>> found.total_order.round(1).tolist()
     [[0.8, 0.2]]
     """
-    if not (isinstance(level, Real) and 0.0 < level < 1.0):
+    estimation = SobolEstimation(a, b, mixed, level=level, resamples=resamples, seed=seed)
+    for _ in estimation.batches():
+        pass
+    return estimation.indices()
+
+
+class SobolEstimation:
+    """Indices whose intervals are known better with each batch of resamples; see `sobol_indices` for the parameters."""
+
+    def __init__(
+        self, a: Floats, b: Floats, mixed: Floats, *, level: float, resamples: int, seed: int
+    ) -> None:
+        _refuse(level, resamples, seed)
+        self._points, self._shape = (a, b, mixed), (a.shape[1], mixed.shape[1])
+        self._level, self._resamples, self._seed = level, resamples, seed
+        self._whole = np.isfinite(a) & np.isfinite(b) & np.isfinite(mixed).all(axis=1)
+        self._groups: list[_Group] = []
+
+    def batches(self) -> Generator[int, None, None]:
+        """Estimate quantities with the same whole blocks together; yield the number of resamples of each batch."""
+        a, b, mixed = self._points
+        patterns, which = np.unique(self._whole, axis=1, return_inverse=True)
+        for number, rows in enumerate(patterns.T):
+            if rows.sum() < FEWEST_BLOCKS:
+                continue
+            chosen = np.flatnonzero(which.reshape(-1) == number)
+            moments = _Moments(a[np.ix_(rows, chosen)], b[np.ix_(rows, chosen)], mixed[rows][:, :, chosen])
+            group = _Group(chosen, moments.indices(np.ones((1, rows.sum())))[:, 0], [])
+            self._groups.append(group)
+            for weights in _weights(int(rows.sum()), self._resamples, self._seed):
+                group.draws.append(moments.indices(weights))
+                yield len(weights)
+
+    def indices(self) -> Indices:
+        """Return the indices with the intervals of the resamples so far."""
+        found = np.full((2, *self._shape, 3), np.nan)
+        for group in self._groups:
+            found[:, group.quantities, :, :1] = group.indices[..., None]
+            if group.draws:
+                draws = np.concatenate(group.draws, axis=1)
+                ends = np.quantile(draws, [0.5 - 0.5 * self._level, 0.5 + 0.5 * self._level], axis=1)
+                found[:, group.quantities, :, 1:] = np.moveaxis(ends, 0, -1)
+        (first, total), blocks = found, self._whole.sum(axis=0)
+        return Indices(first[..., 0], total[..., 0], first[..., 1:], total[..., 1:], blocks)
+
+
+def _refuse(level: Any, resamples: Any, seed: Any) -> None:
+    if not (isinstance(level, Real) and 0.0 < float(level) < 1.0):
         raise UsageError(f"level: expected a number between 0 and 1, got {level!r}.")
-    if not (isinstance(resamples, Integral) and 2 <= resamples <= 10**6):
+    if not (isinstance(resamples, Integral) and 2 <= int(resamples) <= 10**6):
         raise UsageError(f"resamples: expected a whole number from 2 to 1000000, got {resamples!r}.")
-    if not (isinstance(seed, Integral) and seed >= 0):
+    if not (isinstance(seed, Integral) and int(seed) >= 0):
         raise UsageError(f"seed: expected a whole number >= 0, got {seed!r}.")
-    quantities, keys = a.shape[1], mixed.shape[1]
-    whole = np.isfinite(a) & np.isfinite(b) & np.isfinite(mixed).all(axis=1)
-    found = np.full((2, quantities, keys, 3), np.nan)
-    patterns, which = np.unique(whole, axis=1, return_inverse=True)
-    for number, rows in enumerate(patterns.T):
-        if rows.sum() < FEWEST_BLOCKS:
-            continue
-        chosen = np.flatnonzero(which.reshape(-1) == number)
-        moments = _Moments(a[np.ix_(rows, chosen)], b[np.ix_(rows, chosen)], mixed[rows][:, :, chosen])
-        found[:, chosen, :, :1] = moments.indices(np.ones((1, rows.sum())))[:, 0, ..., None]
-        draws = np.concatenate(
-            [moments.indices(w) for w in _weights(int(rows.sum()), resamples, seed)], axis=1
-        )
-        ends = np.quantile(draws, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=1)
-        found[:, chosen, :, 1:] = np.moveaxis(ends, 0, -1)
-    (first, total), blocks = found, whole.sum(axis=0)
-    return Indices(first[..., 0], total[..., 0], first[..., 1:], total[..., 1:], blocks)
+
+
+class _Group(NamedTuple):
+    """Quantities with the same whole blocks: their places, their indices, and those of each batch of resamples."""
+
+    quantities: NDArray[np.intp]
+    indices: Floats
+    draws: list[Floats]
 
 
 def _weights(blocks: int, resamples: int, seed: int) -> Iterator[Floats]:

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset import dataset_file, open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import DRAW
+from vibroimpact.analysis.operations.sensitivity import LEVEL, RESAMPLES, Sensitivity
 from vibroimpact.analysis.sensitivity.design import design_of
-from vibroimpact.analysis.sensitivity.indices import FEWEST_BLOCKS, sobol_indices
+from vibroimpact.analysis.sensitivity.indices import FEWEST_BLOCKS, SobolEstimation
 from vibroimpact.analysis.sensitivity.quantities import quantities_of
+from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
-LEVEL = 0.95
-RESAMPLES = 1000
 TABLE = ResultTable(
     "sensitivity",
     ("first_order", "quantity ... parameter", "1", "first-order Sobol index"),
@@ -38,6 +45,114 @@ TABLE = ResultTable(
     ("bound", "bound", "1", "end of an interval", "text"),
     ("quantity_name", "quantity", "1", "quantity in words", "text"),
 )
+
+
+@dataclass(eq=False)
+class SensitivityOfCampaign(Study[int]):
+    """Sobol indices of a campaign; a row is the number of resamples of a batch. See `sensitivity_report`."""
+
+    name = "sensitivity"
+    nothing = "an index"
+    named = (DatasetError, UsageError)
+    mark = "source"
+
+    campaign: xr.Dataset
+    of: Sequence[str] = ()
+    level: float = LEVEL
+    resamples: int = RESAMPLES
+    seed: int = 0
+    source: str = ""
+
+    @classmethod
+    def reads(cls, options: Sensitivity) -> Sequence[Path]:
+        """Return the file of the dataset."""
+        return [dataset_file(options.file)]
+
+    @classmethod
+    def marks(cls, options: Sensitivity) -> Mapping[str, Any]:
+        """Return the path of the dataset."""
+        return {cls.mark: str(options.file)}
+
+    @classmethod
+    def prepare(cls, options: Sensitivity, stack: ExitStack) -> Self:
+        """Open the dataset."""
+        campaign = stack.enter_context(open_dataset(dataset_file(options.file)))
+        settings = options.of or (), options.level, options.resamples, options.seed
+        return cls(campaign, *settings, str(options.file))
+
+    def rows(self) -> Generator[int, None, None]:
+        """Estimate the indices, then resample the blocks batch after batch.
+
+        Raises
+        ------
+        DatasetError
+            The dataset has no Saltelli design, or nothing that varies over it.
+        UsageError
+            There is no such quantity; or the level, the number of resamples or the seed makes no sense.
+        """
+        dataset, self._design = self.campaign, design_of(self.campaign)
+        if taken := sorted({"quantity", "parameter", "bound"} & set(map(str, dataset["outcome"].dims))):
+            raise DatasetError(
+                f"sensitivity: {taken[0]}: expected a dimension of another name. Rename it in Python."
+            )
+        self._quantities = quantities_of(dataset)
+        self._names = _chosen([str(name) for name in self._quantities.data_vars], self.of)
+        self._others = [str(dim) for dim in dataset["outcome"].dims if dim != DRAW]
+        columns = [self._quantities[name].transpose(DRAW, *self._others).values for name in self._names]
+        self._shape = (len(self._names), *columns[0].shape[1:])
+        runs = np.stack(columns, axis=1).reshape(columns[0].shape[0], -1)
+        self._estimation = SobolEstimation(
+            *self._design.parts(runs), level=self.level, resamples=self.resamples, seed=self.seed
+        )
+        yield from self._estimation.batches()
+
+    def made(self) -> xr.Dataset:
+        """Return the indices with their intervals.
+
+        Raises
+        ------
+        DatasetError
+            Nothing varies.
+        """
+        coordinates = {
+            str(name): c.variable.copy(deep=False)
+            for name, c in self.campaign.coords.items()
+            if c.dims and set(c.dims) <= set(self._others)
+        }
+        for coordinate in coordinates.values():
+            coordinate.attrs.setdefault("units", "1")  # the words of a direction have none
+        level = f"{100.0 * self.level:g} %"
+        report = TABLE.dataset(self._values(), over=tuple(self._others), coords=coordinates, level=level)
+        remarks = list(_remarks(report, self._design.blocks))
+        if not np.isfinite(report.total_order.values).any():
+            raise DatasetError(f"sensitivity: expected a quantity that varies, got none: {' '.join(remarks)}")
+        kept = {name: self.campaign.attrs[name] for name in ("title", "scene") if name in self.campaign.attrs}
+        attributes = {
+            "blocks_drawn": self._design.blocks,
+            "level": self.level,
+            "resamples": self.resamples,
+            "seed": self.seed,
+            "remarks": "\n".join(remarks),
+        }
+        return report.assign_attrs(kept | attributes)
+
+    def _values(self) -> dict[str, Any]:
+        indices, keys = self._estimation.indices(), len(self._design.names)
+        return {
+            "first_order": indices.first_order.reshape(*self._shape, keys),
+            "total_order": indices.total_order.reshape(*self._shape, keys),
+            "first_order_interval": indices.first_interval.reshape(*self._shape, keys, 2),
+            "total_order_interval": indices.total_interval.reshape(*self._shape, keys, 2),
+            "blocks": indices.blocks.reshape(self._shape),
+            "quantity": self._names,
+            "parameter": list(self._design.names),
+            "bound": ["lower", "upper"],
+            "quantity_name": [self._quantities[name].attrs["long_name"] for name in self._names],
+        }
+
+    def print_results(self) -> None:
+        """Print a row for each quantity and parameter."""
+        _print(wide_terminal(), self.dataset.assign_attrs(source=self.source))
 
 
 def sensitivity_report(
@@ -77,44 +192,7 @@ def sensitivity_report(
     --------
     >>> sensitivity_report(open_dataset("campaign")).total_order      # doctest: +SKIP
     """
-    design = design_of(dataset)
-    if taken := sorted({"quantity", "parameter", "bound"} & set(map(str, dataset["outcome"].dims))):
-        raise DatasetError(
-            f"sensitivity: {taken[0]}: expected a dimension of another name. Rename it in Python."
-        )
-    found = quantities_of(dataset)
-    names = _chosen([str(name) for name in found.data_vars], of)
-    others = [str(dim) for dim in dataset["outcome"].dims if dim != DRAW]
-    columns = [found[name].transpose(DRAW, *others).values for name in names]
-    shape = (len(names), *columns[0].shape[1:])
-    runs = np.stack(columns, axis=1).reshape(columns[0].shape[0], -1)
-    indices = sobol_indices(*design.parts(runs), level=level, resamples=resamples, seed=seed)
-    keys = len(design.names)
-    values = {
-        "first_order": indices.first_order.reshape(*shape, keys),
-        "total_order": indices.total_order.reshape(*shape, keys),
-        "first_order_interval": indices.first_interval.reshape(*shape, keys, 2),
-        "total_order_interval": indices.total_interval.reshape(*shape, keys, 2),
-        "blocks": indices.blocks.reshape(shape),
-        "quantity": names,
-        "parameter": list(design.names),
-        "bound": ["lower", "upper"],
-        "quantity_name": [found[name].attrs["long_name"] for name in names],
-    }
-    coordinates = {
-        str(name): c.variable.copy(deep=False)
-        for name, c in dataset.coords.items()
-        if c.dims and set(c.dims) <= set(others)
-    }
-    for coordinate in coordinates.values():
-        coordinate.attrs.setdefault("units", "1")  # the words of a direction have none
-    report = TABLE.dataset(values, over=tuple(others), coords=coordinates, level=f"{100.0 * level:g} %")
-    remarks = list(_remarks(report, design.blocks))
-    if not np.isfinite(report.total_order.values).any():
-        raise DatasetError(f"sensitivity: expected a quantity that varies, got none: {' '.join(remarks)}")
-    attributes = {"blocks_drawn": design.blocks, "level": level, "resamples": resamples, "seed": seed}
-    kept = {name: dataset.attrs[name] for name in ("title", "scene") if name in dataset.attrs}
-    return report.assign_attrs(kept | attributes | {"remarks": "\n".join(remarks)})
+    return whole(SensitivityOfCampaign(dataset, of, level, resamples, seed)).dataset
 
 
 def _chosen(there: Sequence[str], of: Sequence[str]) -> list[str]:
@@ -154,3 +232,33 @@ def _remarks(report: xr.Dataset, drawn: int) -> list[str]:
                 "indices are those of what is left."
             )
     return remarks
+
+
+def _print(console: Terminal, found: xr.Dataset) -> None:
+    """Print a table: of indices along other keys their mean, lowest and highest value."""
+    along = [str(dim) for dim in found.total_order.dims if dim not in ("quantity", "parameter")]
+    interval = f"{100.0 * found.attrs['level']:g} %"
+    beside = "lowest to highest" if along else interval
+    first, total = ("first order, mean", "total, mean") if along else ("first order", "total")
+    headings = ("<quantity", "<parameter", f">{first}", f">{beside}", f">{total}", f">{beside}")
+    where = f" (along {', '.join(along)})" if along else ""
+    title = f"Shares of variance: {found.attrs.get('title') or found.attrs['source']}{where}"
+    console.print(table(title, *headings, rows=_rows(found, bool(along))))
+    for line in found.attrs["remarks"].splitlines():
+        console.print(line, style="yellow", soft_wrap=True)
+
+
+def _rows(found: xr.Dataset, are_many: bool) -> Iterator[tuple[str, ...]]:
+    for quantity in found["quantity"].values.tolist():
+        for parameter in found["parameter"].values.tolist():
+            own = found.sel(quantity=quantity, parameter=parameter)
+            if not bool(own.total_order.notnull().any()):
+                continue
+            cells: list[str] = []
+            for name in ("first_order", "total_order"):
+                values = own[name].values
+                ends = values if are_many else own[f"{name}_interval"].values
+                there, known = values[np.isfinite(values)], ends[np.isfinite(ends)]
+                cells.append(f"{there.mean():.3f}" if there.size else "-")
+                cells.append(f"{known.min():.3f} to {known.max():.3f}" if known.size else "-")
+            yield quantity, parameter, *cells

@@ -8,7 +8,15 @@ nothing heavy.
 
 from __future__ import annotations
 
-from vibroimpact.fmus.operations.declaring import Door, Operation, Option, Positional, Request, operation
+from vibroimpact.fmus.operations.declaring import (
+    Door,
+    Operation,
+    Option,
+    Positional,
+    Request,
+    operation,
+    study,
+)
 from vibroimpact.fmus.operations.shared import STRICT, DatasetFile, FigureFile, Force
 
 __all__ = [
@@ -22,4 +30,5 @@ __all__ = [
     "Positional",
     "Request",
     "operation",
+    "study",
 ]

@@ -18,6 +18,8 @@ from typing import (
 )
 
 ROOT = __name__.partition(".")[0]
+CONDUCTS = "analysis.commands.studies:conduct"
+"""Carries out every operation that is a study."""
 Declared = TypeVar("Declared", bound="Operation")
 
 
@@ -121,10 +123,13 @@ class Operation:
         `module:function` below the package: called with the operation, it carries it out.
     door : Door or None
         The function in Python, whose signature a test compares with the arguments.
+    study : str
+        `module:class` of the study that it is, below the package; empty: it is no study.
     """
 
     runs: ClassVar[str]
     door: ClassVar[Door | None]
+    study: ClassVar[str] = ""
 
     def carry_out(self, **how: Any) -> None:
         """Call the function that the operation names, with keywords of it that are no arguments of the operation."""
@@ -148,5 +153,16 @@ def operation(runs: str, door: Door | None = None) -> Callable[[type[Declared]],
     def declared(cls: type[Declared]) -> type[Declared]:
         cls.runs, cls.door = runs, door
         return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
+    return declared
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def study(place: str, door: Door | None = None) -> Callable[[type[Declared]], type[Declared]]:
+    """Return a decorator that declares an operation that is a study: `module:class` of it, and its door."""
+
+    def declared(cls: type[Declared]) -> type[Declared]:
+        cls.study = place
+        return operation(CONDUCTS, door)(cls)
 
     return declared

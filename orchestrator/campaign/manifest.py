@@ -18,11 +18,12 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
-from vibroimpact.orchestrator.run.provenance import git_commit, provenance, versions
+from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 FORMAT = 2

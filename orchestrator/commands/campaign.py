@@ -7,16 +7,16 @@ from pathlib import Path
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_folder
-from vibroimpact.fmus.messages import typed
+from vibroimpact.fmus.messages import counted, typed
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
-from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
-from vibroimpact.orchestrator.commands.preparing import prepared
+from vibroimpact.orchestrator.commands.failures import outcome_lines
 from vibroimpact.orchestrator.operations.campaign import Campaign
 from vibroimpact.orchestrator.run.progress import shown_progress
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
+from vibroimpact.orchestrator.study.preparing import prepared
 
 
 def run_to_folder(options: Campaign) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import typer
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import counted, duration
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import SceneCost, cost_of
 from vibroimpact.orchestrator.campaign.check import (
@@ -18,22 +19,15 @@ from vibroimpact.orchestrator.campaign.check import (
     Trial,
 )
 from vibroimpact.orchestrator.campaign.processors import processor_count
-from vibroimpact.orchestrator.commands.failures import FAILED, counted
-from vibroimpact.orchestrator.commands.preparing import with_modes
+from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.study.preparing import with_modes
 
 _WIDTH = 10
-_DURATIONS = (
-    (1e-3, "us", 1e6),
-    (1.0, "ms", 1e3),
-    (120.0, "s", 1.0),
-    (7200.0, "min", 1 / 60),
-    (172800.0, "h", 1 / 3600),
-)
 
 
 def check_scene(options: Check) -> None:
@@ -142,19 +136,3 @@ def _memory(cost: SceneCost, copies: int) -> str:
     if cost.trial is None or cost.trial.given_up:
         return ""
     return f"; at its end {size(copies * cost.points * cost.trial.size)} of memory for results"
-
-
-def duration(seconds: float) -> str:
-    """Return a wall time as a person reads it, with two digits.
-
-    >>> duration(2.34e-3), duration(59.6), duration(5000.0), duration(4e6)
-    ('2.3 ms', '60 s', '83 min', '46 days')
-    """
-    for below, unit, factor in _DURATIONS:
-        if seconds < below:
-            return f"{_two_digits(seconds * factor)} {unit}"
-    return f"{_two_digits(seconds / 86400)} days"
-
-
-def _two_digits(number: float) -> str:
-    return f"{number:.0f}" if number >= 9.95 else f"{number:.2g}"

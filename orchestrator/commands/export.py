@@ -45,9 +45,9 @@ def export_to_file(options: ExportFmu) -> None:
 def _export_scene_file(options: ExportFmu, kinds: Mapping[str, bool]) -> None:
     # half a second of libraries that a component needs none of
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
-    from vibroimpact.orchestrator.commands.preparing import with_modes
     from vibroimpact.orchestrator.run.export import export_scene
     from vibroimpact.orchestrator.scene import load_scene
+    from vibroimpact.orchestrator.study.preparing import with_modes
 
     file = Path(options.component)
     scene = with_modes(load_scene(file, options.changes or ()))

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, open_dataset
+from vibroimpact.fmus.messages import counted
 
 FAILED = (Outcome.error, Outcome.crash, Outcome.timeout)
 """Outcomes of points without a result; the others are physics."""
@@ -68,12 +69,3 @@ def _warning_lines(dataset: xr.Dataset) -> Iterator[str]:
         yield f"warning: {message}"
     if len(messages) > MOST_WARNINGS:
         yield f"{len(messages) - MOST_WARNINGS} more warnings are in the dataset."
-
-
-def counted(count: int, what: str) -> str:
-    """Return a number with its noun.
-
-    >>> counted(1, "run"), counted(3, "run")
-    ('1 run', '3 runs')
-    """
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"

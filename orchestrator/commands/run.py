@@ -7,16 +7,17 @@ import time
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign.manifest import holds_scene
-from vibroimpact.orchestrator.commands.failures import FAILED, counted, outcome_lines
-from vibroimpact.orchestrator.commands.preparing import prepared
+from vibroimpact.orchestrator.commands.failures import FAILED, outcome_lines
 from vibroimpact.orchestrator.operations.run import Run
 from vibroimpact.orchestrator.run.dataset import has_messages
 from vibroimpact.orchestrator.run.progress import shown_progress
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene.summary import in_one_line
 from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.study.preparing import prepared
 
 
 def run_to_dataset(options: Run) -> None:

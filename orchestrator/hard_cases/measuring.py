@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from operator import attrgetter
@@ -25,7 +25,6 @@ from vibroimpact.orchestrator.hard_cases.rests import CASES as RESTS
 from vibroimpact.orchestrator.hard_cases.scales import CASES as SCALES
 from vibroimpact.orchestrator.hard_cases.several import CASES as SEVERAL
 from vibroimpact.orchestrator.hard_cases.yielding import CASES as YIELDING
-from vibroimpact.orchestrator.run.provenance import program_attributes
 
 CASES: tuple[HardCase, ...] = (
     *(*FINDING, *IMPACTS, *PLACES, *RESTS),
@@ -141,19 +140,14 @@ def _as_texts(names: object) -> list[str]:
 
 
 def measured_cases(
-    names: Sequence[str] = (),
-    told: Callable[[Measured], None] = lambda measured: None,
-    *,
-    clock: Callable[[], float] = time.process_time,
-) -> list[Measured]:
-    """Run hard cases.
+    names: Sequence[str] = (), *, clock: Callable[[], float] = time.process_time
+) -> Generator[Measured, None, None]:
+    """Run hard cases, and yield each as soon as it has run.
 
     Parameters
     ----------
     names : sequence of str
         Those to run; none: all.
-    told : callable
-        Given each as soon as it has run.
     clock : callable
         Returns the processor time since some instant, s.
 
@@ -162,11 +156,8 @@ def measured_cases(
     UsageError
         There is no such case.
     """
-    found = []
     for case in cases_named(names):
-        found.append(_measured(case, clock))
-        told(found[-1])
-    return found
+        yield _measured(case, clock)
 
 
 def _measured(case: HardCase, clock: Callable[[], float]) -> Measured:
@@ -188,5 +179,5 @@ def dataset_of(measured: Sequence[Measured]) -> xr.Dataset:
         y[place, : len(one.found.curve.y)] = one.found.curve.y
     columns = {name: [attrgetter(path)(one) for one in measured] for name, path in _PATHS.items()}
     missed = [one.case.name for one in measured if not one.is_met]
-    attributes = {"title": "Hard cases", "missed": ", ".join(missed)} | program_attributes()
+    attributes = {"title": "Hard cases", "missed": ", ".join(missed)}
     return TABLE.dataset({**columns, "x": x, "y": y}, attributes)

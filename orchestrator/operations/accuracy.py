@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 
-@operation("orchestrator.commands.accuracy:study_scene", Door("accuracy", without=("write",)))
+@study("orchestrator.study.accuracy.study:AccuracyOfScene", Door("accuracy", without=("write",)))
 class Accuracy(Operation):
     """Show what accuracy costs in time: simulate a scene in all ways that it can be, against the best reference.
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 
-@operation("orchestrator.commands.basins:show_basins", Door("basins", without=("output",)))
+@study("orchestrator.orbits.basins:BasinsOfScene", Door("basins", without=("output",)))
 class Basins(Operation):
     """Find which attractor each start of a plane of displacements and velocities ends on, and the share of each.
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 
-@operation("orchestrator.commands.control:show_control", Door("control", without=("output", "keep")))
+@study("orchestrator.orbits.control:Controlled", Door("control", without=("output", "keep")))
 class Control(Operation):
     """Keep a periodic orbit, also where it is unstable, by small corrections of the forcing amplitude at each impact.
 

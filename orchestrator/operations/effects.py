@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 
-@operation("orchestrator.commands.effects:show_effects", Door("effects"))
+@study("orchestrator.study.cost_of_effects:CostOfEffects", Door("effects"))
 class Effects(Operation):
     """Say what a scene asks for, what each of it costs and changes, and what is not simulated.
 

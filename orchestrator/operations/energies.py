@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDataset
 
 
-@operation(
-    "orchestrator.commands.energies:show_energies",
+@study(
+    "orchestrator.orbits.energies:EnergiesOfRuns",
     Door("energies", also=("progress: Progress | None = None",), without=("output",)),
 )
 class Energies(Operation):

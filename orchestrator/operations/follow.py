@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, Run, SceneFile, Seed
 
 
-@operation("orchestrator.commands.follow:show_branches", Door("follow"))
+@study("orchestrator.orbits.follow:Following", Door("follow"))
 class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 
 
-@operation("orchestrator.commands.hard_cases:show_hard_cases", Door("hard_cases", without=("names",)))
+@study("orchestrator.hard_cases.study:MeasuredCases", Door("hard_cases", without=("names",)))
 class HardCases(Operation):
     """Run what breaks solvers of impacts, and print each figure beside its bound.
 

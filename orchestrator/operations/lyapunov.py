@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDataset
 
 
-@operation("orchestrator.commands.lyapunov:show_exponents", Door("lyapunov", without=("output",)))
+@study("orchestrator.orbits.lyapunov:ExponentsOfRuns", Door("lyapunov", without=("output",)))
 class Lyapunov(Operation):
     """Find the Lyapunov exponents of runs with impacts, from the saltation of their impacts; their sum is checked.
 

@@ -12,12 +12,12 @@ from vibroimpact.fmus.operations import (
     Operation,
     Option,
     Positional,
-    operation,
+    study,
 )
 from vibroimpact.orchestrator.operations.arguments import Changes
 
 
-@operation("orchestrator.commands.maps:show_map")
+@study("orchestrator.orbits.maps:MapOfScene")
 class Maps(Operation):
     """Draw a map of a scene: impacts or states at phase 0 with its orbits, sets of grazing impacts, normal forms.
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
 from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, Run, SceneFile, Seed
 
 
-@operation("orchestrator.commands.orbit:show_orbits", Door("find_orbits", without=("output",)))
+@study("orchestrator.orbits.find:OrbitsOfScene", Door("find_orbits", without=("output",)))
 class FindOrbits(Operation):
     """Find periodic orbits of a scene, stable and unstable ones, and say what their multipliers are.
 

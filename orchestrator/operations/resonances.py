@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, operation
+from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, study
 from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDataset
 
 
-@operation("orchestrator.commands.resonances:show_resonances", Door("resonances", without=("output",)))
+@study("orchestrator.orbits.resonances:PeaksOfSweep", Door("resonances", without=("output",)))
 class Resonances(Operation):
     """Find the peaks of a sweep of the forcing frequency, of the whole body and of each mode, beside what shifts them.
 

@@ -1,11 +1,12 @@
-"""Basins of attraction of a scene over a plane of start states."""
+"""The study `basins`: basins of attraction of a scene over a plane of start states."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Generator
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
@@ -21,13 +22,18 @@ from vibroimpact.analysis.orbits.basins import (
     find_basins,
 )
 from vibroimpact.analysis.orbits.body import ImpactingBody
+from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.operations.basins import Basins as Options
 from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow, start_names
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
+from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "basins of attraction found by vibroimpact"
 TABLE = ResultTable(
@@ -64,7 +70,6 @@ REACH = 2.0
 """Half the width of the plane over the size of the scene's own motion, unless it is said."""
 
 Span = tuple[float, float]
-Told = Callable[[Basins], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,28 +154,6 @@ def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarra
     return beyond
 
 
-def prepare_basins(scene: Scene, plane: Plane) -> tuple[Scene, Floats, Floats, Basins]:
-    """Return the scene alone, the axes of a plane, and its starts, whose ends are not known yet.
-
-    Raises
-    ------
-    UsageError
-        The scene has no orbits, or the plane no starts.
-    """
-    plane.refuse()
-    alone = scene.unswept()
-    body = impacting_body(alone)
-    _axes(alone, plane.number)
-    spans, scale = _spans(alone, body, plane)
-    x, y, states = start_states(alone, plane, spans)
-    labels = np.where(beyond_stops(alone, body, states), BEYOND_A_STOP, UNDECIDED).astype(np.int16)
-    if (labels == BEYOND_A_STOP).all():
-        raise UsageError("basins: x: expected starts on the free side of the stops, got none.")
-    half = states.shape[1] // 2
-    sizes = np.repeat([max(scale[0], np.abs(spans[0]).max()), max(scale[1], np.abs(spans[1]).max())], half)
-    return alone, x, y, Basins(states, labels, sizes)
-
-
 def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span, Span], tuple[float, float]]:
     """Return the ends of both axes, and the size of the scene's own motion."""
     flow = BodyFlow(scene, workers=1)
@@ -240,10 +223,163 @@ def _element(scene: Scene, number: int | None) -> str:
     return f" of {'mass' if isinstance(scene.body, ChainBody) else 'mode'} {place}"
 
 
-def run_basins(scene: Scene, found: Basins, told: Told | None = None) -> None:
-    """Find where the starts end; `found` grows meanwhile."""
-    flow = BodyFlow(scene)
+def span_of(text: str | None, name: str) -> Span | None:
+    """Return `LOW:HIGH` as two numbers.
+
+    Raises
+    ------
+    UsageError
+
+    Examples
+    --------
+    >>> span_of("-1:0.5", "x")
+    (-1.0, 0.5)
+    """
+    if text is None:
+        return None
+    parts = text.split(":")
     try:
-        find_basins(found, flow, block=BLOCK, told=told)
-    finally:
-        flow.close()
+        low, high = map(float, parts)
+    except ValueError:
+        raise UsageError(f"--{name}: expected LOW:HIGH, two numbers, got {text!r}.") from None
+    return low, high
+
+
+def points_of(text: str) -> tuple[int, int]:
+    """Return `N` or `NxM` as the starts along both axes.
+
+    Raises
+    ------
+    UsageError
+
+    Examples
+    --------
+    >>> points_of("200"), points_of("300x200")
+    ((200, 200), (300, 200))
+    """
+    parts = text.lower().split("x")
+    if len(parts) > 2 or not all(part.isascii() and part.isdigit() for part in parts):
+        raise UsageError(f"--points: expected a number of starts, or two as 300x200, got {text!r}.")
+    return int(parts[0]), int(parts[-1])
+
+
+@dataclass(eq=False)
+class BasinsOfScene(Study[Basins]):
+    """Where the starts of a plane end; a row is what is known after a block of starts.
+
+    Parameters
+    ----------
+    scene : Scene
+        An oscillator, a chain or a beam on restitution stops; its sweep is left out.
+    plane : Plane
+    """
+
+    name = "basins"
+    nothing = "an attractor"
+    begins = "Looking for attractors"
+    history = HISTORY
+    interruption = "Interrupted: the above is what is known so far."
+
+    scene: Scene
+    plane: Plane
+
+    def __post_init__(self) -> None:
+        self.plane.refuse()
+        self.scene = self.scene.unswept()
+        body = impacting_body(self.scene)
+        _axes(self.scene, self.plane.number)
+        spans, scale = _spans(self.scene, body, self.plane)
+        self.x, self.y, states = start_states(self.scene, self.plane, spans)
+        beyond = beyond_stops(self.scene, body, states)
+        if beyond.all():
+            raise UsageError("basins: x: expected starts on the free side of the stops, got none.")
+        half = states.shape[1] // 2
+        sizes = np.repeat(
+            [max(size, np.abs(ends).max()) for size, ends in zip(scale, spans, strict=True)], half
+        )
+        labels = np.where(beyond, BEYOND_A_STOP, UNDECIDED).astype(np.int16)
+        self.known = Basins(states, labels, sizes)
+
+    @classmethod
+    def prepare(cls, options: Options, stack: ExitStack) -> Self:
+        """Open the scene, and place the starts."""
+        spans = span_of(options.x, "x"), span_of(options.y, "y")
+        plane = Plane(*spans, points_of(options.points), options.number)
+        return cls(opened_scene(options.scene, options.changes or ()), plane)
+
+    def rows(self) -> Generator[Basins, None, None]:
+        """Follow the starts block by block."""
+        flow = BodyFlow(self.scene)
+        try:
+            for now in find_basins(self.known, flow, block=BLOCK):
+                names = ", ".join(now.names) or "none yet"
+                self.status(f"{100.0 * now.decided:.1f} % of {now.possible} starts; {names}")
+                yield now
+        finally:
+            flow.close()
+
+    def take(self, row: Basins) -> None:
+        """Keep nothing: what is known has grown."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no attractor is known."""
+        return not self.known.attractors
+
+    def made(self) -> xr.Dataset:
+        """Return what is known of the plane."""
+        return basins_dataset(self.scene, self.plane, self.x, self.y, self.known)
+
+    def print_results(self) -> None:
+        """Print each attractor with its share, and what is not known."""
+        found, data = self.known, self.dataset
+        rows = table(
+            f"Basins of attraction: {self.scene.title or self.scene.source}",
+            *("<attractor", ">share of the starts", "<displacement, velocity at forcing phase 0"),
+        )
+        for place, name in enumerate(found.names):
+            states = np.column_stack(
+                [data[f"attractor_{what}"].values[place] for what in ("displacement", "velocity")]
+            )
+            told_states = "; ".join(f"{a:.6g}, {b:.6g}" for a, b in states[:4] if np.isfinite(a))
+            rows.add_row(
+                name,
+                f"{100.0 * found.fractions[place]:.2f} %",
+                told_states + (" ..." if len(states) > 4 else ""),
+            )
+        wide_terminal().print(rows)
+        _say_rest(found, data)
+
+
+def _say_rest(found: Basins, data: xr.Dataset) -> None:
+    undecided = 1.0 - found.decided
+    if undecided > 0.0:
+        say(f"{100.0 * undecided:.3g} % of the starts came near to no attractor that is known.")
+    if found.told_by_sample:
+        say(
+            f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were. Such a "
+            f"sample may miss an attractor with up to {100.0 * found.undetected_share_below:.2g} % of the starts "
+            "(95 % confidence)."
+        )
+    _say_chaotic(found)
+    share, dimension = float(data["border_fraction"]), float(data["border_dimension"])
+    if np.isfinite(dimension):
+        error = float(data["border_dimension_error"])
+        say(f"{100.0 * share:.3g} % lie on a border, whose dimension is {dimension:.3f} +- {error:.3f}.")
+    elif share > 0.0:
+        say(f"{100.0 * share:.3g} % lie on a border.")
+
+
+def _say_chaotic(found: Basins) -> None:
+    """Print what tells chaotic attractors apart, or that they are not told apart."""
+    chaotic = [
+        (name, each) for name, each in zip(found.names, found.attractors, strict=True) if each.is_chaotic
+    ]
+    for name, each in chaotic:
+        if not each.is_one:
+            say(
+                "Chaotic runs differ by more than their own scatter: there may be several chaotic attractors."
+            )
+        elif len(chaotic) > 1:
+            rates = ", ".join(f"{rate:.3g} at stop {stop}" for stop, rate in enumerate(each.impacts, start=1))
+            say(f"{name}: impacts in a forcing period: {rates}.")

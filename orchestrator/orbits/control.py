@@ -1,7 +1,7 @@
-"""An unstable orbit that is kept by its forcing amplitude while the angular frequency changes: thesis 3.5.2.
+"""The study `control`: an unstable orbit that is kept by its forcing amplitude over angular frequencies.
 
-The components are coupled as any others: body and stop, which answers its impacts, and a controller, which answers each
-impact by the force of the next flight. Nothing here iterates a map.
+Thesis 3.5.2. The components are coupled as any others: body and stop, which answers its impacts, and a controller,
+which answers each impact by the force of the next flight. Nothing here iterates a map.
 """
 
 from __future__ import annotations
@@ -9,21 +9,35 @@ from __future__ import annotations
 import dataclasses
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.outputs import refuse_folder
 from vibroimpact.analysis.dataset.results import ResultTable
+from vibroimpact.analysis.study import Study
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import counted
+from vibroimpact.fmus.packaging.python_fmus import require_pythonfmu
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.importer.master import Importer
-from vibroimpact.orchestrator.orbits.control_parts import SEEN, coupled
+from vibroimpact.orchestrator.operations.control import Control
+from vibroimpact.orchestrator.orbits.control_parts import SEEN, coupled, coupled_scene
 from vibroimpact.orchestrator.orbits.control_plan import (
     LONGEST_STAY,
     ControlPlan,
+    ControlSettings,
+    control_plan,
+    settings_of,
 )
 from vibroimpact.orchestrator.run.provenance import scene_attributes
+from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "periodic orbits kept by vibroimpact"
 TABLE = ResultTable(
@@ -44,18 +58,20 @@ AT_THE_END = 20
 """Impacts at the last angular frequency of a plan."""
 CHUNK = 16
 """Forcing periods between two looks at the controller."""
+_SHOWN = 8
+"""Orbits that are printed."""
 
-Told = Callable[[float, int], None]
-"""Called with the angular frequency reached and the number of impacts so far."""
 
+@dataclass(eq=False)
+class Controlled(Study[int]):
+    """An orbit that is kept from one angular frequency to another; a row is the number of impacts so far.
 
-@dataclass(slots=True)
-class Controlled:
-    """What became of a plan.
+    Parameters
+    ----------
+    plan : ControlPlan
 
     Attributes
     ----------
-    plan : ControlPlan
     impacts : list of tuple
         Of each: time (s), phase (rad), speed (m/s), and of the flight that led to it forcing amplitude (N), angular
         frequency (rad/s) and row of the plan.
@@ -63,9 +79,63 @@ class Controlled:
         Why it ended.
     """
 
+    name = "control"
+    nothing = "an impact"
+    begins = "Looking for the orbits"
+    history = HISTORY
+    interruption = "Interrupted: the above is what was kept so far."
+
     plan: ControlPlan
     impacts: list[tuple[float, ...]] = field(default_factory=list)
     end: str = "interrupted"
+
+    @classmethod
+    def prepare(cls, options: Control, stack: ExitStack) -> Self:
+        """Open the scene, find the orbits, and leave the controller where that is asked for."""
+        settings, keep = _settings(options), options.keep
+        require_pythonfmu()
+        if keep is not None:
+            refuse_folder(keep)
+            if keep.exists():
+                raise UsageError(f"{keep}: expected a new folder, got one that is there.")
+        scene = opened_scene(options.scene, options.changes or ())
+        with Terminal(stderr=True).status(cls.begins):
+            study = cls(control_plan(scene, options.start, options.stop, settings))
+        if keep is not None:
+            _keep(study.plan, keep)
+        return study
+
+    def rows(self) -> Generator[int, None, None]:
+        """Couple body, stop and controller, and let them go through the plan.
+
+        Raises
+        ------
+        ComponentError
+            pythonfmu is not installed; or a component fails.
+        """
+        with tempfile.TemporaryDirectory() as folder:
+            controller = self.plan.controller(Path(folder, "controller.fmu"))
+            components, connections = coupled(self.plan, controller)
+            importer = Importer(components, connections, macro_step=self.plan.orbits[0].body.period)
+            try:
+                for impacts in _run(importer, self):
+                    many = counted(impacts, "impact")
+                    self.status(f"Angular frequency {self.reached:.6g}, {many}")
+                    yield impacts
+            finally:
+                importer.free()
+
+    def take(self, row: int) -> None:
+        """Keep nothing: the list of impacts has grown."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there was no impact."""
+        return not self.impacts
+
+    def made(self) -> xr.Dataset:
+        """Return impacts and orbits."""
+        return _dataset(self)
 
     @property
     def reached(self) -> float:
@@ -82,41 +152,12 @@ class Controlled:
         kept = [row for row in sorted(visits) if visits[row] >= 2 and not (lost and row == rows[-1])]
         return self.plan.orbits[kept[-1]].body.angular_frequency if kept else None
 
-    @property
-    def dataset(self) -> xr.Dataset:
-        """Impacts and orbits."""
-        return _dataset(self)
+    def print_results(self) -> None:
+        """Print some of the orbits, and how far they were kept."""
+        _print(self)
 
 
-def run_plan(plan: ControlPlan, told: Told | None = None, *, into: Controlled | None = None) -> Controlled:
-    """Couple body, stop and controller and let them go through a plan.
-
-    Parameters
-    ----------
-    plan : ControlPlan
-    told : callable, optional
-        Where it is.
-    into : Controlled, optional
-        Grows meanwhile: what Ctrl-C leaves.
-
-    Raises
-    ------
-    ComponentError
-        pythonfmu is not installed; or a component fails.
-    """
-    found = Controlled(plan) if into is None else into
-    with tempfile.TemporaryDirectory() as folder:
-        controller = plan.controller(Path(folder, "controller.fmu"))
-        components, connections = coupled(plan, controller)
-        importer = Importer(components, connections, macro_step=plan.orbits[0].body.period)
-        try:
-            _run(importer, found, told)
-        finally:
-            importer.free()
-    return found
-
-
-def _run(importer: Importer, found: Controlled, told: Told | None) -> None:
+def _run(importer: Importer, found: Controlled) -> Iterator[int]:
     plan = found.plan
     body, controller = importer.components["body"], importer.components["controller"]
     port = f"contact[{int(plan.orbits[0].contacts[0]) + 1}]"
@@ -146,8 +187,7 @@ def _run(importer: Importer, found: Controlled, told: Told | None) -> None:
         longest = plan.orbits[stay[1] if stay[1] >= 0 else 0].body.period
         importer.advance(importer.time + CHUNK * plan.settings.periods * longest)
         kept.get()
-        if told is not None:
-            told(found.reached, len(found.impacts))
+        yield len(found.impacts)
         if not kept.values[0]:
             found.end = "lost: an impact came a quarter of a period off"
         elif len(found.impacts) == before:
@@ -196,3 +236,52 @@ def _dataset(found: Controlled) -> xr.Dataset:
         }
     )
     return TABLE.dataset(values, attributes, units=plan.scene.units)
+
+
+def _settings(options: Control) -> ControlSettings:
+    return settings_of(
+        law=options.law,
+        step=options.step,
+        tolerance=options.tolerance,
+        limit=options.limit,
+        noise=options.noise,
+        seed=options.seed,
+        periods=options.periods,
+        stay=options.stay,
+    )
+
+
+def _keep(plan: ControlPlan, folder: Path) -> None:
+    folder.mkdir(parents=True)
+    controller = plan.controller(folder / "controller.fmu")
+    (folder / "scene.toml").write_text(coupled_scene(plan, controller.name), encoding="utf-8")
+    say(f"Controller and scene written to {folder}.")
+
+
+def _print(found: Controlled) -> None:
+    plan, data = found.plan, found.dataset
+    shown = table(
+        f"P(1,{plan.settings.periods}) kept by {plan.settings.law}: {plan.scene.title or plan.scene.source}",
+        *(">angular frequency", ">impact velocity", ">largest multiplier", ">impacts", ">largest correction"),
+    )
+    at, correction = data["impact_orbit"].values, np.abs(data["correction"].values)
+    for place in np.unique(np.linspace(0, int(at.max()), _SHOWN).round().astype(int)):
+        orbit, own = plan.orbits[place], at == place
+        shown.add_row(
+            f"{orbit.body.angular_frequency:.8g}",
+            f"{float(orbit.velocities[0]):.8g}",
+            f"{abs(orbit.multipliers[0]):.5g}",
+            f"{int(own.sum())}",
+            f"{100.0 * float(correction[own].max()):.2g} %" if own.any() else "",
+        )
+    wide_terminal().print(shown)
+    unstable = int((data["orbit_multiplier"].values[: int(at.max()) + 1] >= 1.0).sum())
+    say(
+        f"{counted(len(found.impacts), 'impact')}, {counted(int(at.max()) + 1, 'orbit')}, {unstable} of them unstable; "
+        f"largest correction {100.0 * float(correction.max()):.3g} %."
+    )
+    kept = "nowhere" if found.kept_to is None else f"to {found.kept_to:.8g}"
+    say(f"Kept {kept}: {found.end}.")
+    if plan.ends_at is not None:
+        away = "" if found.kept_to is None else f", {abs(found.kept_to - plan.ends_at):.2g} away"
+        say(f"There is no such orbit beyond {plan.ends_at:.10g}{away}.")

@@ -1,10 +1,13 @@
-"""Energies of the modes of the runs of a dataset: the orbit next to the impacts of each run, what goes on there."""
+"""The study `energies`: energies of the modes over the orbit next to the impacts of each run of a dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Generator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
@@ -17,21 +20,27 @@ from vibroimpact.analysis.orbits.energies import (
     OrbitEnergies,
     energy_transfer,
     orbit_energies,
+    residual_restitution,
     velocity_transfer,
 )
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.orbits.runs import (
     Bodies,
     ImpactsOf,
     OnSweep,
+    RunsStudy,
     place_of,
+    runs_of,
     scene_of,
     units_of,
     why_without_orbit,
 )
-from vibroimpact.orchestrator.run.progress import Progress
+from vibroimpact.orchestrator.run.progress import Progress, shown_progress
 from vibroimpact.orchestrator.run.provenance import runs_attributes
 
 TABLE = ResultTable(
@@ -102,6 +111,67 @@ _OF_RUNS: Mapping[str, Callable[[OrbitEnergies], float]] = {
 Found = OrbitEnergies | str
 _MANY = 5000
 """Runs from which on it takes seconds."""
+_MOST_SHOWN = 4
+"""Modes up to which the matrices of an impact are printed."""
+
+
+@dataclass(eq=False)
+class EnergiesOfRuns(RunsStudy[tuple[Found, float]]):
+    """Energies of the modes of the runs of a dataset; a row is those of a run, and how far it is from its orbit.
+
+    Parameters
+    ----------
+    runs : xarray.Dataset
+    run : int, optional
+        `run_index` of one run alone.
+    progress : Progress, optional
+        Told how far it is, where there are many runs.
+    """
+
+    name = "energies"
+    nothing = "a run with energies"
+    named = (DatasetError, UsageError)
+
+    run: int | None = None
+    progress: Progress | None = None
+
+    @classmethod
+    def prepare(cls, options: Any, stack: ExitStack) -> Self:
+        """Open the runs."""
+        runs = stack.enter_context(runs_of(options.file, options.changes or ()))
+        return cls(runs, options.run, stack.enter_context(shown_progress()))
+
+    def rows(self) -> Generator[tuple[Found, float], None, None]:
+        """Find the energies of run after run."""
+        scene, runs = scene_of(self.runs, "energies"), self.runs.vibroimpact.runs
+        chosen = range(runs.sizes["run"]) if self.run is None else [place_of(runs, self.run, "energies")]
+        self._many, impacts, self._bodies = len(chosen), ImpactsOf(self.runs), Bodies(scene, runs)
+        seen = self.progress if self.progress is not None and self._many >= _MANY else Progress()
+        seen.begin(self._many, 0)
+        for place in chosen:
+            yield _of_run(self._bodies, impacts, runs, place)
+            seen.advance(1)
+
+    def made(self) -> xr.Dataset:
+        """Return the energies of one run, or those of all on the dimensions of the sweep.
+
+        Raises
+        ------
+        DatasetError
+            The only run has no orbit.
+        """
+        attrs, units = runs_attributes(self.runs.attrs), units_of(self.runs)
+        if self._many > 1:
+            rest: list[tuple[Found, float]] = [(self.left_out, np.nan)] * (self._many - len(self.found))
+            return _on_sweep(self.runs, self.found + rest, self._bodies.most_modes, attrs, units)
+        only, distance = self.found[0]
+        if isinstance(only, str):
+            raise DatasetError(f"energies: expected a run with a periodic orbit, got none: {only}.")
+        return _of_one(only, distance, attrs, units)
+
+    def print_results(self) -> None:
+        """Print the energies of the only orbit, or of all as a whole."""
+        (_print_one if "orbit" in self.dataset.attrs else _print_all)(self.dataset)
 
 
 def energies(
@@ -142,24 +212,7 @@ def energies(
     if not isinstance(dataset, xr.Dataset):
         with open_dataset(dataset) as opened:
             return energies(opened, run, progress=progress)
-    scene = scene_of(dataset, "energies")
-    runs = dataset.vibroimpact.runs
-    chosen = range(runs.sizes["run"]) if run is None else [place_of(runs, run, "energies")]
-    impacts = ImpactsOf(dataset)
-    bodies = Bodies(scene, runs)
-    seen = progress if progress is not None and len(chosen) >= _MANY else Progress()
-    seen.begin(len(chosen), 0)
-    found = []
-    for place in chosen:
-        found.append(_of_run(bodies, impacts, runs, place))
-        seen.advance(1)
-    attrs, units = runs_attributes(dataset.attrs), units_of(dataset)
-    if len(found) > 1:
-        return _on_sweep(dataset, found, bodies.most_modes, attrs, units)
-    only, distance = found[0]
-    if isinstance(only, str):
-        raise DatasetError(f"energies: expected a run with a periodic orbit, got none: {only}.")
-    return _of_one(only, distance, attrs, units)
+    return whole(EnergiesOfRuns(dataset, run, progress)).dataset
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:
@@ -224,3 +277,76 @@ def _on_sweep(
             f"energies: {taken[0]}: expected a swept key or dimension of another name. Rename it."
         )
     return TABLE.dataset(values, attrs, over=runs.dims, coords=runs.coords, units=units)
+
+
+def _print_one(found: xr.Dataset) -> None:
+    stable = "stable" if found.attrs["is_stable"] else "unstable"
+    unit = _unit(found)
+    rows = table(
+        f"Energies of the modes{unit}: {found.attrs.get('title', '')}, {found.attrs['orbit']}, {stable}",
+        *(">mode", ">natural frequency", ">force gives", ">damping takes", ">residual", ">change at impacts"),
+    )
+    columns = ("forcing_work", "damping_loss", "residual_energy", "impact_change")
+    for mode in found["mode"].values:
+        own = found.sel(mode=mode)
+        rows.add_row(
+            f"{mode}", f"{own.natural_frequency:.6g}", *(f"{float(own[name]):.6g}" for name in columns)
+        )
+    rows.add_row("all", "", *(f"{float(found[name].sum()):.6g}" for name in columns))
+    console = wide_terminal()
+    console.print(rows)
+    lost, met = float(found.contact_loss), float(found.contact_energy)
+    say(
+        f"Impacts meet {met:.6g} and lose {lost:.6g}; identity (6.32) closed to {float(found.identity_error):.1e}."
+    )
+    masses = ", ".join(f"{each:.6g}" for each in found["contact_mass"].values)
+    say(f"Mass that an impact meets{', kg' if unit else ''}: {masses}.")
+    said = residual_restitution(float(found.residual_energy.sum()), met)
+    slope = f", {said.slope:.4g} per unit of residual energy" if np.isfinite(said.slope) else ""
+    say(f"Restitution from the residual energy: {said.problem or f'{said.value:.9g}{slope}'}.")
+    if float(found.transient) > 1e-9:
+        say(f"Recorded impacts are {float(found.transient):.1e} from the orbit: a transient is not over.")
+    if found.sizes["mode"] <= _MOST_SHOWN:
+        _print_matrices(console, found)
+
+
+def _print_matrices(console: Terminal, found: xr.Dataset) -> None:
+    for stop in range(found.sizes["contact"]):
+        where = f" of stop {stop + 1}" if found.sizes["contact"] > 1 else ""
+        matrices = [found[name].values[stop] for name in ("velocity_transfer", "energy_transfer")]
+        modes = [f">{mode}" for mode in found["mode"].values]
+        shown = table(f"[R^] and [R*]{where}", ">mode", *modes, ">", *modes)
+        for mode, *both in zip(found["mode"].values, *matrices, strict=True):
+            cells = [[f"{value:.6f}" for value in row] for row in both]
+            shown.add_row(f"{mode}", *cells[0], "", *cells[1])
+        console.print(shown)
+
+
+def _print_all(found: xr.Dataset) -> None:
+    reasons = [str(text) for text in found.reason.values.ravel() if str(text) != "no run"]
+    there = reasons.count("")
+    say(f"{found.attrs.get('title', '')}: {there} of {len(reasons)} runs have a periodic orbit.")
+    if there:
+        worst = float(np.nanmax(found.identity_error.values))
+        away = float(np.nanmax(found.transient.values))
+        say(f"Identity (6.32) closed to {worst:.1e}, recorded impacts {away:.1e} from their orbit, at worst.")
+        rows = table(f"Residual energy of the modes over an orbit{_unit(found)}", *_HEADINGS)
+        for mode in found["mode"].values:
+            values = found.residual_energy.sel(mode=mode).values
+            known = values[np.isfinite(values)]
+            gives = 100.0 * float((known < 0.0).mean())
+            rows.add_row(
+                f"{mode}",
+                *(f"{each:.6g}" for each in (known.min(), known.mean(), known.max())),
+                f"{gives:.0f} %",
+            )
+        wide_terminal().print(rows)
+    for words, count in Counter(text.split(":")[0] for text in reasons if text).most_common():
+        say(f"{count} without: {words}.")
+
+
+_HEADINGS = (">mode", ">least", ">mean", ">most", ">fed by impacts in")
+
+
+def _unit(found: xr.Dataset) -> str:
+    return "" if found.attrs.get("units_system") == "nondimensional" else ", J"

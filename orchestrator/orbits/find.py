@@ -1,20 +1,34 @@
-"""Periodic orbits of a scene: those of given p and q, and the one that a long run ends on."""
+"""The study `orbit`: periodic orbits of a scene: those of given p and q, and the one that a long run ends on."""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
+import xarray as xr
 
+from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
+from vibroimpact.analysis.orbits.branches import multiplier_text
 from vibroimpact.analysis.orbits.found import FoundOrbits
-from vibroimpact.analysis.orbits.search import orbits_of, same_orbit
+from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
+from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import counted
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.operations.orbit import FindOrbits
+from vibroimpact.orchestrator.orbits.beginning import begun, files_of, refuse_contradictions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "periodic orbits found by vibroimpact"
 LONGEST = 16
@@ -25,6 +39,104 @@ LARGEST_PHASE = 1e6
 """Of a seed, rad: a larger one has lost digits of the turn that it is in."""
 REPEATS = 1e-4
 """Difference of phases, rad, up to which a run has come near to an orbit; Newton's method does the rest."""
+
+
+@dataclass(eq=False)
+class OrbitsOfScene(Study[PeriodicOrbit]):
+    """Periodic orbits of a scene; a row is an orbit. See `find_orbits` for the parameters."""
+
+    name = "orbit"
+    nothing = "an orbit"
+    history = HISTORY
+    mark = ""
+
+    scene: Scene
+    impacts: int | None = None
+    periods: int | None = None
+    seed: Seed | None = None
+    penetrating: bool = False
+
+    def __post_init__(self) -> None:
+        self.scene = self.scene.unswept()
+
+    @classmethod
+    def reads(cls, options: FindOrbits) -> Sequence[Path]:
+        """Return scene and dataset."""
+        return [options.scene, *files_of(options)]
+
+    @classmethod
+    def prepare(cls, options: FindOrbits, stack: ExitStack) -> Self:
+        """Open the scene, at the values of the run that the orbit is one of."""
+        refuse_contradictions(options)
+        changes = options.changes or ()
+        first = begun(options, opened_scene(options.scene, changes, for_orbits=True), changes)
+        return cls(first.scene, first.impacts, first.periods, first.seed, options.penetrating)
+
+    def rows(self) -> Generator[PeriodicOrbit, None, None]:
+        """Look for the orbit near to the seed, for those that are counted, or for those of one impact and of a run."""
+        body, counts = impacting_body(self.scene), (self.impacts, self.periods)
+        if self.seed is not None:
+            yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
+            return
+        impacts, periods = (1 if count is None else count for count in counts)
+        yield from each_orbit(body, impacts, periods, penetrating=self.penetrating)
+        self.found.sort(key=fastest_first)
+        reached = orbit_of_run(self.scene) if counts == (None, None) else None
+        if reached is not None and not any(same_orbit(reached, other) for other in self.found):
+            yield reached
+
+    @property
+    def orbits(self) -> FoundOrbits:
+        """What was found, as a list that has a dataset."""
+        return FoundOrbits(self.found, self.scene.units, self._attributes)
+
+    def _attributes(self) -> dict[str, Any]:
+        return scene_attributes(self.scene, HISTORY) | program_attributes()
+
+    def made(self) -> xr.Dataset:
+        """Return the physical orbits as runs."""
+        return self.orbits.dataset
+
+    @property
+    def _physical(self) -> list[PeriodicOrbit]:
+        return [orbit for orbit in self.found if orbit.is_physical]
+
+    @property
+    def written(self) -> xr.Dataset | None:
+        """The physical orbits; None where there is none."""
+        return self.dataset if self._physical else None
+
+    @property
+    def drawn(self) -> FoundOrbits | None:
+        """All orbits; None where there is none."""
+        return self.orbits if self.found else None
+
+    def print_results(self) -> None:
+        """Print a row for each orbit."""
+        rows = table(
+            f"Periodic orbits: {self.scene.title or self.scene.source}",
+            *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
+            *("<largest multipliers", ">determinant, off by", ">nearest maximum"),
+            rows=map(_told, self.found),
+        )
+        if self.found:
+            wide_terminal().print(rows)
+        many = counted(len(self._physical), "physical orbit")
+        say(f"{many}." if self._physical else f"No physical orbit {self._called}.")
+
+    @property
+    def _called(self) -> str:
+        """What the orbits that are looked for are called."""
+        if self.seed is not None:
+            return "near to the seed"
+        if self.impacts is None and self.periods is None:
+            return "P(1,1), and none that a long run ends on"
+        return f"P({self.impacts or 1},{self.periods or 1})"
+
+    def conclude(self, options: FindOrbits) -> None:
+        """Say where no dataset was written."""
+        if options.output is not None and not self._physical:
+            say(f"{options.output} is not written: it would hold no orbit.")
 
 
 def find_orbits(
@@ -56,25 +168,7 @@ def find_orbits(
     OrbitError
         There is no orbit near to the seed.
     """
-    alone = scene.unswept()
-    orbits = _found(alone, impacts, periods, seed, penetrating)
-    return FoundOrbits(orbits, alone.units, partial(scene_attributes, alone, HISTORY))
-
-
-def _found(
-    alone: Scene, impacts: int | None, periods: int | None, seed: Seed | None, penetrating: bool
-) -> list[PeriodicOrbit]:
-    body = impacting_body(alone)
-    if seed is not None:
-        return [_of_seed(body, seed, impacts, 1 if periods is None else periods)]
-    if impacts is not None or periods is not None:
-        counts = 1 if impacts is None else impacts, 1 if periods is None else periods
-        return orbits_of(body, *counts, penetrating=penetrating)
-    found = orbits_of(body, penetrating=penetrating)
-    reached = orbit_of_run(alone)
-    if reached is not None and not any(same_orbit(reached, other) for other in found):
-        found.append(reached)
-    return found
+    return whole(OrbitsOfScene(scene, impacts, periods, seed, penetrating)).orbits
 
 
 def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int) -> PeriodicOrbit:
@@ -131,3 +225,26 @@ def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
             return None
         return orbit if orbit.is_physical else None
     return None
+
+
+def _told(orbit: PeriodicOrbit) -> tuple[str, ...]:
+    off = orbit.determinant / orbit.exact_determinant - 1.0 if orbit.exact_determinant > 0.0 else np.nan
+    return (
+        orbit.name,
+        "stable" if orbit.is_stable else "unstable",
+        ", ".join(f"{phase:.10g}" for phase in orbit.phases),
+        ", ".join(str(contact + 1) for contact in orbit.contacts),
+        ", ".join(f"{speed:.10g}" for speed in orbit.velocities),
+        ", ".join(multiplier_text(each) for each in orbit.multipliers[:2]),
+        f"{orbit.exact_determinant:.6g}, {off:.0e}",
+        _nearest(orbit),
+    )
+
+
+def _nearest(orbit: PeriodicOrbit) -> str:
+    beyond, _, contact = orbit.highest
+    if contact < 0:
+        return "none"
+    if orbit.is_physical:
+        return f"{-beyond:.3g} below stop {contact + 1}"
+    return f"penetrates stop {contact + 1} by {beyond:.3g}"

@@ -1,7 +1,10 @@
-"""Lyapunov exponents of the runs of a dataset."""
+"""The study `lyapunov`: Lyapunov exponents of the runs of a dataset."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from os import PathLike
 
 import numpy as np
@@ -11,7 +14,11 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.orbits.exponents import ExponentError, Exponents, exponents_of
-from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, OnSweep, scene_of, units_of
+from vibroimpact.analysis.study import whole
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, OnSweep, RunsStudy, scene_of, units_of
 from vibroimpact.orchestrator.run.provenance import runs_attributes
 
 TABLE = ResultTable(
@@ -25,6 +32,48 @@ TABLE = ResultTable(
     ("reason", "...", "1", "why a run has no exponents, else empty", "text"),
     ("exponent", "exponent", "1", "exponent, the largest first"),
 )
+
+_NUMBER = re.compile(r"\d+")
+_MOST_SHOWN = 30
+"""Runs that are told one by one."""
+
+
+@dataclass(eq=False)
+class ExponentsOfRuns(RunsStudy[Exponents | str]):
+    """Lyapunov exponents of the runs of a dataset; a row is those of a run, or why it has none."""
+
+    name = "lyapunov"
+    nothing = "a run with exponents"
+    named = (DatasetError,)
+
+    def rows(self) -> Generator[Exponents | str, None, None]:
+        """Find the exponents of run after run."""
+        runs = self.runs.vibroimpact.runs
+        self._bodies, impacts = Bodies(scene_of(self.runs, "lyapunov"), runs), ImpactsOf(self.runs)
+        for place in range(runs.sizes["run"]):
+            yield _of_run(self._bodies, impacts, runs, place)
+
+    def made(self) -> xr.Dataset:
+        """Return the exponents on the dimensions of the sweep."""
+        many = self.runs.vibroimpact.runs.sizes["run"] - len(self.found)
+        return _on_sweep(self.runs, [*self.found, *[self.left_out] * many], 2 * self._bodies.most_modes)
+
+    def print_results(self) -> None:
+        """Print the exponents of runs, and how many have none.
+
+        Raises
+        ------
+        DatasetError
+            No run has exponents.
+        """
+        reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
+        counts = _counted([text for text in reasons if text])
+        if all(reasons):
+            told = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
+            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {told}")
+        _print(self.dataset)
+        for words, count in counts:
+            say(f"{count} without: {words}")
 
 
 def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
@@ -57,10 +106,7 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     if not isinstance(dataset, xr.Dataset):
         with open_dataset(dataset) as opened:
             return lyapunov(opened)
-    scene, runs = scene_of(dataset, "lyapunov"), dataset.vibroimpact.runs
-    bodies, impacts = Bodies(scene, runs), ImpactsOf(dataset)
-    found = [_of_run(bodies, impacts, runs, place) for place in range(runs.sizes["run"])]
-    return _on_sweep(dataset, found, 2 * bodies.most_modes)
+    return whole(ExponentsOfRuns(dataset)).dataset
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> Exponents | str:
@@ -100,3 +146,46 @@ def _on_sweep(dataset: xr.Dataset, found: list[Exponents | str], most: int) -> x
     }
     attrs = runs_attributes(dataset.attrs)
     return TABLE.dataset(values, attrs, over=runs.dims, coords=runs.coords, units=units_of(dataset))
+
+
+def _counted(reasons: Sequence[str]) -> list[tuple[str, int]]:
+    """Return reasons with how many runs have them, the commonest first; of those that differ by numbers, the first."""
+    kinds: dict[str, list[str]] = {}
+    for text in reasons:
+        kinds.setdefault(_NUMBER.sub("#", text), []).append(text)
+    ordered = sorted(kinds.values(), key=len, reverse=True)
+    return [(each[0] + (" (the first of them)" if len(set(each)) > 1 else ""), len(each)) for each in ordered]
+
+
+def _print(found: xr.Dataset) -> None:
+    flat = found.stack(run=found.reason.dims) if found.reason.dims else found.expand_dims("run")
+    known = flat.isel(run=np.flatnonzero(np.isfinite(flat.impacts.values)))
+    rows = table(
+        f"Lyapunov exponents per impact: {found.attrs.get('title', '')}",
+        *("<", ">largest", ">+-", ">others", ">per time", ">dimension", ">impacts"),
+    )
+    for place in range(min(known.sizes["run"], _MOST_SHOWN)):
+        one = known.isel(run=place)
+        values = one.lyapunov_exponent.values
+        rows.add_row(
+            _where(one, found),
+            f"{values[0]:.6g}",
+            f"{float(one.standard_error.values[0]):.1g}",
+            ", ".join(f"{each:.6g}" for each in values[1:4] if np.isfinite(each)),
+            f"{values[0] / float(one.impact_interval):.6g}",
+            "" if np.isnan(one.dimension) else f"{float(one.dimension):.4g}",
+            f"{int(one.impacts)}",
+        )
+    wide_terminal().print(rows)
+    if known.sizes["run"] > _MOST_SHOWN:
+        first = known.isel(exponent=0)
+        chaotic = int((first.lyapunov_exponent > 2.0 * first.standard_error).sum())
+        say(f"{known.sizes['run']} runs have exponents, of {chaotic} the largest is positive.")
+
+
+def _where(one: xr.Dataset, found: xr.Dataset) -> str:
+    told = []
+    for name in (str(dim) for dim in found.reason.dims if str(dim) in one.coords):
+        value = one[name].item()
+        told.append(f"{name} {value:.6g}" if isinstance(value, float) else str(value))
+    return ", ".join(told)

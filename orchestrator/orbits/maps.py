@@ -1,29 +1,45 @@
-"""Maps of a scene: where impacts and periods lead to, the sets of grazing impacts, and what a graze is like."""
+"""The study `maps`: where impacts and periods of a scene lead to, sets of grazing impacts, and what a graze is like."""
 
 from __future__ import annotations
 
 import math
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, Self, cast
 
 import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
+from vibroimpact.analysis.dataset.schema import UnitSystem
 from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.grazing_sets import grazing_sets
-from vibroimpact.analysis.orbits.normal_forms import Nordmark, grazing_family, square_root_diagram
+from vibroimpact.analysis.orbits.normal_forms import (
+    GrazingFamily,
+    Nordmark,
+    grazing_family,
+    one_mode,
+    periods_of,
+    square_root_diagram,
+)
 from vibroimpact.analysis.orbits.periodic import TURN
+from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import counted
+from vibroimpact.fmus.terminal import say
+from vibroimpact.orchestrator.operations.maps import Maps
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import find_orbits
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.parameters import float_parameters
-from vibroimpact.orchestrator.run.provenance import program_attributes, scene_attributes
+from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "maps of vibroimpact"
 MapKind = Literal["impact", "strobe", "discontinuity", "nordmark", "square-root"]
@@ -31,6 +47,8 @@ MAP_KINDS: tuple[MapKind, ...] = ("impact", "strobe", "discontinuity", "nordmark
 POINTS = 1500
 """Values of a diagram's parameter, phases of a set, unless it is said."""
 MOST_POINTS = 100_000
+PART = 500
+"""Values of a diagram that are iterated together: Ctrl-C is heard in between."""
 RHO, OFFSET = (-0.02, 0.1), (-0.01, 0.12)
 """Ranges of the diagrams, unless they are said."""
 CLASSES = {True: "stable", False: "unstable"}
@@ -57,6 +75,11 @@ IMPACTS = ResultTable(
     ("after_velocity", "graze", "m s-1", "W: velocity of the impact after the graze"),
 )
 """Variables of an impact map; those of grazes are there with the kind `discontinuity`."""
+_SETS = {
+    "grazes": "graze_phase",
+    **{name: name for name in ("before_phase", "before_velocity", "after_phase", "after_velocity")},
+}
+"""Variables of the sets of grazing impacts, by their names in what is found of them."""
 NORDMARK = ResultTable(
     "maps",
     ("rho", "rho", "1", "distance from the graze in Nordmark's map"),
@@ -151,68 +174,145 @@ def settings_of(kind: str, **options: Any) -> MapSettings:
     return settings
 
 
-def map_of(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
-    """Return a map of a scene as points to be drawn; square-root, and nordmark with alpha and gamma, need no scene.
+@dataclass(eq=False)
+class MapOfScene(Study[str]):
+    """A map of a scene as points to be drawn; a row is the name of a part of it, or of a part of a diagram.
 
-    Raises
-    ------
-    UsageError
-        The scene has no such map.
-    OrbitError
-        The body has several modes, where the map is one of one mode.
+    Parameters
+    ----------
+    scene : Scene, optional
+        `square-root`, and `nordmark` with alpha and gamma, need none.
+    settings : MapSettings
     """
-    if settings.kind == "square-root":
-        found = _square_root(settings)
-    elif settings.kind == "nordmark":
-        found = _nordmark(scene, settings)
-    else:
-        found = _of_impacts(_needed(scene, settings), settings)
-    attributes = program_attributes()
-    if scene is not None:
-        attributes |= scene_attributes(scene, HISTORY) | {"units_system": scene.units}
-    return found.assign_attrs(attributes | {"map": settings.kind, "history": HISTORY})
+
+    name = "maps"
+    nothing = "a map"
+    history = HISTORY
+
+    scene: Scene | None
+    settings: MapSettings
+
+    def __post_init__(self) -> None:
+        self.values: dict[str, Any] = {}
+        self.attributes: dict[str, Any] = {}
+
+    @classmethod
+    def reads(cls, options: Maps) -> Sequence[Path]:
+        """Return the scene, if there is one."""
+        return [] if options.scene is None else [options.scene]
+
+    @classmethod
+    def marks(cls, options: Maps) -> Mapping[str, Any]:
+        """Return the path of the scene."""
+        return {} if options.scene is None else super().marks(options)
+
+    @classmethod
+    def prepare(cls, options: Maps, stack: ExitStack) -> Self:
+        """Open the scene."""
+        settings = _settings(options)
+        if options.scene is not None:
+            return cls(opened_scene(options.scene, options.changes or ()), settings)
+        if options.changes:
+            raise UsageError("--set: expected a scene to change, got none.")
+        return cls(None, settings)
+
+    def rows(self) -> Generator[str, None, None]:
+        """Find part after part.
+
+        Raises
+        ------
+        UsageError
+            The scene has no such map.
+        OrbitError
+            The body has several modes, where the map is one of one mode.
+        """
+        kind = self.settings.kind
+        if kind == "square-root":
+            yield from self._square_root()
+        elif kind == "nordmark":
+            yield from self._nordmark()
+        else:
+            yield from self._of_impacts(_needed(self.scene, self.settings))
+
+    def made(self) -> xr.Dataset:
+        """Return the points."""
+        tables = {"strobe": STATES, "nordmark": NORDMARK, "square-root": SQUARE_ROOT}
+        scene, kind = self.scene, self.settings.kind
+        units: UnitSystem = "SI" if scene is None else scene.units
+        found = tables.get(kind, IMPACTS).dataset(self.values, self.attributes, units=units)
+        attributes: dict[str, Any] = {}
+        if scene is not None:
+            attributes = scene_attributes(scene, HISTORY) | {"units_system": scene.units}
+        return found.assign_attrs(attributes | {"map": kind, "history": HISTORY})
+
+    def print_results(self) -> None:
+        """Print what the map has."""
+        _tell(self.dataset)
+
+    def _of_impacts(self, scene: Scene) -> Generator[str, None, None]:
+        body = impacting_body(scene)
+        is_strobe, has_sets = self.settings.kind == "strobe", self.settings.kind == "discontinuity"
+        if has_sets:
+            one_mode(body)  # refused before anything is found
+            self.values |= dict.fromkeys(_SETS.values(), np.empty(0))
+        across = "displacement" if is_strobe else "phase"
+        states = _run(scene, strobe=is_strobe)
+        self._mark([], across)
+        self.values |= {across: states[:, 0], "velocity": states[:, 1]}
+        yield "states"
+        with suppress(OrbitError):  # a body without losses has families of them, of which none is marked
+            self._mark(find_orbits(scene, 1, 1), across)
+        yield "orbits"
+        if has_sets:
+            found = grazing_sets(body, self.settings.points)
+            self.values |= {name: getattr(found, where) for where, name in _SETS.items()}
+            yield "sets"
+
+    def _mark(self, orbits: Sequence[PeriodicOrbit], across: str) -> None:
+        of = _strobed if across == "displacement" else _impact
+        marks = np.array([of(orbit) for orbit in orbits]).reshape(-1, 2)
+        self.values |= {
+            f"orbit_{across}": marks[:, 0],
+            "orbit_velocity": marks[:, 1],
+            "orbit_name": [_named(orbit) for orbit in orbits],
+        }
+
+    def _nordmark(self) -> Generator[str, None, None]:
+        chosen, family = _nordmark(self.scene, self.settings)
+        self.attributes = {"alpha": chosen.alpha, "gamma": chosen.gamma, "restitution": chosen.restitution}
+        if family is not None:
+            self.attributes |= {"grazing_amplitude": family.amplitude, "rho_slope": family.slope}
+        if chosen.oscillator is not None:
+            ratio, frequency = chosen.oscillator
+            self.attributes |= {"oscillator_damping_ratio": ratio, "oscillator_frequency_ratio": frequency}
+        self.attributes |= {"root_sign": chosen.sign}
+        for rho in self._diagram("rho", RHO, chosen.diagram):
+            if family is not None:
+                self.values["forcing_amplitude"] = family.amplitude_of(rho)
+            yield "rho"
+
+    def _square_root(self) -> Generator[str, None, None]:
+        slope = 0.5 if self.settings.slope is None else self.settings.slope
+        self.attributes = {"slope": slope}
+        for _ in self._diagram("d", OFFSET, partial(square_root_diagram, slope)):
+            yield "d"
+
+    def _diagram(
+        self, name: str, span: tuple[float, float], states_at: Callable[[Floats], Floats]
+    ) -> Iterator[Floats]:
+        """Yield the values of a diagram whose states are known, part after part."""
+        values = np.linspace(*(self.settings.span or span), self.settings.points)
+        parts: list[Floats] = []
+        for begin in range(0, values.size, PART):
+            parts.append(states_at(values[begin : begin + PART]))
+            self.values = {name: values[: begin + PART], "x": np.concatenate(parts)}
+            yield self.values[name]
 
 
 def _needed(scene: Scene | None, settings: MapSettings) -> Scene:
     if scene is None:
         raise UsageError(f"maps: scene: expected one for the kind {settings.kind}, got none.")
     return scene.unswept()
-
-
-# ---- of a scene's impacts ----
-
-
-def _of_impacts(scene: Scene, settings: MapSettings) -> xr.Dataset:
-    body = impacting_body(scene)
-    orbits: list[PeriodicOrbit] = []
-    with suppress(OrbitError):  # a body without losses has families of them, of which none is marked
-        orbits += find_orbits(scene, 1, 1)
-    is_strobe = settings.kind == "strobe"
-    states = _run(scene, strobe=is_strobe)
-    if is_strobe:
-        marks = np.array([_strobed(orbit) for orbit in orbits]).reshape(-1, 2)
-    else:
-        marks = np.array([(np.mod(orbit.phases[0], TURN), orbit.velocities[0]) for orbit in orbits]).reshape(
-            -1, 2
-        )
-    across = "displacement" if is_strobe else "phase"
-    values = {
-        across: states[:, 0],
-        "velocity": states[:, 1],
-        f"orbit_{across}": marks[:, 0],
-        "orbit_velocity": marks[:, 1],
-        "orbit_name": [_named(orbit) for orbit in orbits],
-    }
-    if settings.kind == "discontinuity":
-        found = grazing_sets(body, settings.points)
-        values |= {
-            "graze_phase": found.grazes,
-            "before_phase": found.before_phase,
-            "before_velocity": found.before_velocity,
-            "after_phase": found.after_phase,
-            "after_velocity": found.after_velocity,
-        }
-    return (STATES if is_strobe else IMPACTS).dataset(values, units=scene.units)
 
 
 def _run(scene: Scene, *, strobe: bool = False) -> Floats:
@@ -247,44 +347,83 @@ def _named(orbit: PeriodicOrbit) -> str:
     return f"{'flip ' if multipliers[0].real < 0.0 else ''}saddle {orbit.name}"
 
 
-# ---- of a graze ----
+def _impact(orbit: PeriodicOrbit) -> tuple[float, float]:
+    return np.mod(orbit.phases[0], TURN), orbit.velocities[0]
 
 
-def _nordmark(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
-    rho = np.linspace(*(settings.span or RHO), settings.points)
-    family = None
-    if settings.alpha is None or settings.gamma is None:
-        alone = _needed(scene, settings)
-        if not isinstance(alone.body, OscillatorBody):
-            raise UsageError(
-                f"{alone.source}: body.kind: expected an oscillator for Nordmark's map, got another body."
-            )
-        amplitude = float_parameters(alone, None)["forcing.amplitude"]
-        if amplitude == 0.0:
-            raise UsageError(f"{alone.source}: forcing.amplitude: expected a force, got 0.")
-        family = grazing_family(impacting_body(alone), amplitude)
-        chosen = family.map
-        if settings.restitution is not None:
-            raise UsageError(
-                "maps: restitution: expected with alpha and gamma, got it with those of the scene."
-            )
-    else:
+def _nordmark(scene: Scene | None, settings: MapSettings) -> tuple[Nordmark, GrazingFamily | None]:
+    """Return Nordmark's map, and how the scene comes to its graze where the map is that of a scene."""
+    if settings.alpha is not None and settings.gamma is not None:
         restitution = 1.0 if settings.restitution is None else settings.restitution
-        chosen = Nordmark(settings.alpha, settings.gamma, restitution)
-    values = {"rho": rho, "x": chosen.diagram(rho)}
-    if family is not None:
-        values["forcing_amplitude"] = family.amplitude_of(rho)
-    attributes = {"alpha": chosen.alpha, "gamma": chosen.gamma, "restitution": chosen.restitution}
-    if family is not None:
-        attributes |= {"grazing_amplitude": family.amplitude, "rho_slope": family.slope}
-    if chosen.oscillator is not None:
-        ratio, frequency = chosen.oscillator
-        attributes |= {"oscillator_damping_ratio": ratio, "oscillator_frequency_ratio": frequency}
-    units = "SI" if scene is None else scene.units
-    return NORDMARK.dataset(values, attributes | {"root_sign": chosen.sign}, units=units)
+        return Nordmark(settings.alpha, settings.gamma, restitution), None
+    alone = _needed(scene, settings)
+    if not isinstance(alone.body, OscillatorBody):
+        raise UsageError(
+            f"{alone.source}: body.kind: expected an oscillator for Nordmark's map, got another body."
+        )
+    amplitude = float_parameters(alone, None)["forcing.amplitude"]
+    if amplitude == 0.0:
+        raise UsageError(f"{alone.source}: forcing.amplitude: expected a force, got 0.")
+    family = grazing_family(impacting_body(alone), amplitude)
+    if settings.restitution is not None:
+        raise UsageError("maps: restitution: expected with alpha and gamma, got it with those of the scene.")
+    return family.map, family
 
 
-def _square_root(settings: MapSettings) -> xr.Dataset:
-    slope = 0.5 if settings.slope is None else settings.slope
-    offsets = np.linspace(*(settings.span or OFFSET), settings.points)
-    return SQUARE_ROOT.dataset({"d": offsets, "x": square_root_diagram(slope, offsets)}, {"slope": slope})
+def _settings(options: Maps) -> MapSettings:
+    start, stop = options.start, options.stop
+    if (start is None) != (stop is None):
+        raise UsageError("maps: from, to: expected both or neither, got one of them.")
+    return settings_of(
+        options.kind,
+        span=None if start is None or stop is None else (start, stop),
+        points=options.points,
+        alpha=options.alpha,
+        gamma=options.gamma,
+        restitution=options.restitution,
+        slope=options.slope,
+    )
+
+
+def _tell(found: xr.Dataset) -> None:
+    kind = found.attrs["map"]
+    if kind in ("nordmark", "square-root"):
+        _tell_diagram(found, "rho" if kind == "nordmark" else "d")
+        return
+    say(f"{counted(found.sizes['state'], 'state' if kind == 'strobe' else 'impact')} of a run.")
+    for name in found["orbit_name"].values:
+        say(f"{name}")
+    if kind == "discontinuity":
+        say(
+            f"S has {int(np.isfinite(found['before_velocity']).sum())} points, W "
+            f"{int(np.isfinite(found['after_velocity']).sum())}, of {found.sizes['graze']} grazes."
+        )
+
+
+def _tell_diagram(found: xr.Dataset, name: str) -> None:
+    if name == "rho":
+        numbers = {key: float(found.attrs[key]) for key in ("alpha", "gamma", "restitution")}
+        say(", ".join(f"{key} {value:.8g}" for key, value in numbers.items()) + ".")
+        if "grazing_amplitude" in found.attrs:
+            say(f"Graze at the forcing amplitude {float(found.attrs['grazing_amplitude']):.12g}.")
+        elif "oscillator_damping_ratio" in found.attrs:
+            ratio, frequency = (
+                float(found.attrs[f"oscillator_{key}_ratio"]) for key in ("damping", "frequency")
+            )
+            say(
+                f"An oscillator of damping ratio {ratio:.8g} has these, forced at {frequency:.8g} times its frequency."
+            )
+        else:
+            say("No oscillator has these: expected -2 sqrt(gamma) <= alpha < 1 + gamma.")
+    states = found["x"].values
+    bounded = np.isfinite(states).all(axis=1)
+    periods = periods_of(np.nan_to_num(states))
+    values = found[name].values
+    runs: list[str] = []
+    edges = np.flatnonzero(np.diff(periods, prepend=-1) != 0)
+    for begin, end in zip(edges, [*edges[1:], len(values)], strict=True):
+        if end - begin >= max(3, len(values) // 100) and bounded[begin:end].all():
+            what = f"period {periods[begin]}" if periods[begin] else "no period"
+            runs.append(f"{what} from {values[begin]:.4g} to {values[end - 1]:.4g}")
+    if runs:
+        say(f"{name}: " + "; ".join(runs) + ".")

@@ -1,8 +1,9 @@
-"""Peaks of the response of a campaign over the forcing frequency, beside the shifted natural frequencies."""
+"""The study `resonances`: peaks of a response over the forcing frequency, beside the shifted natural frequencies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass
 from os import PathLike
 from typing import NamedTuple
 
@@ -12,12 +13,16 @@ import xarray as xr
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.energies import OrbitEnergies
 from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
-from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.analysis.study import whole
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.energies import energies
-from vibroimpact.orchestrator.orbits.runs import scene_of, units_of
+from vibroimpact.orchestrator.orbits.energies import EnergiesOfRuns
+from vibroimpact.orchestrator.orbits.runs import RunsStudy, scene_of, units_of
 from vibroimpact.orchestrator.run.provenance import runs_attributes
 from vibroimpact.orchestrator.scene import Scene
 
@@ -49,6 +54,75 @@ class _Found(NamedTuple):
     quantity: str
     branch: int
     peak: Peak
+
+
+@dataclass(eq=False)
+class PeaksOfSweep(RunsStudy[tuple[OrbitEnergies | str, float]]):
+    """Peaks of the response of a body over the forcing frequency; a row is the energies of a run."""
+
+    name = "resonances"
+    nothing = "a run with energies"
+    named = (DatasetError, UsageError)
+
+    def rows(self) -> Generator[tuple[OrbitEnergies | str, float], None, None]:
+        """Find the energies of run after run."""
+        self._scene = scene_of(self.runs, "resonances")
+        self._name, self._factor = _swept(self.runs, self._scene)
+        self._energies = EnergiesOfRuns(self.runs)
+        for row in self._energies.rows():
+            self._energies.take(row)
+            yield row
+
+    def made(self) -> xr.Dataset:
+        """Return the peaks.
+
+        Raises
+        ------
+        DatasetError
+            There is none.
+        """
+        self._energies.incomplete = self.incomplete
+        exchanged, body, name = self._energies.dataset, impacting_body(self._scene), self._name
+        order = [name] if "direction" not in self.runs["outcome"].dims else ["direction", name]
+        directions = np.atleast_1d(self.runs["direction"].values) if "direction" in order else [""]
+        branches = [str(each) for each in directions]
+        frequency = self._factor * self.runs[name].values.astype(np.float64)
+        curves = dict(_curves(self.runs, exchanged, order, frequency, body))
+        found = _peaks(curves, frequency)
+        deepest = _deepest(self.runs, body, order, frequency.size)
+        shape = (len(branches), frequency.size)
+        motion = _motions(exchanged, order).reshape(shape)
+        ratio = np.array([deepest[each.branch, each.peak.place] for each in found])
+        peaks = [each.peak for each in found]
+        values = {
+            "quantity": [each.quantity for each in found],
+            "peak_branch": [each.branch for each in found],
+            "peak_frequency": [each.frequency for each in peaks],
+            "peak_height": [each.height for each in peaks],
+            "grid_step": [each.step for each in peaks],
+            "motion": [str(motion[each.branch, each.peak.place]) for each in found],
+            "stop_ratio": ratio,
+            "shifted_frequency": _shifted(ratio, body),
+            "natural_frequency": body.frequencies,
+            **curves,
+            "branch": branches,
+            "forcing": frequency,
+            "mode": np.arange(1, body.frequencies.size + 1),
+        }
+        return TABLE.dataset(values, runs_attributes(self.runs.attrs), units=units_of(self.runs))
+
+    def print_results(self) -> None:
+        """Print a row for each peak, and the natural frequencies."""
+        found = self.dataset
+        unit = "" if found.attrs.get("units_system") == "nondimensional" else ", rad/s"
+        headings = "<of", "<branch", f">at{unit}", ">height", "<motion", ">stop ratio"
+        near = ">nearest natural", ">nearest shifted"
+        title = f"Peaks: {found.attrs.get('title', '')}"
+        wide_terminal().print(table(title, *headings, *near, rows=_cells(found)))
+        natural = ", ".join(f"{each:.6g}" for each in found["natural_frequency"].values)
+        say(
+            f"Natural frequencies{unit}: {natural}. A shift is that of one elastic, undamped, unforced mode: a guess."
+        )
 
 
 def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
@@ -83,48 +157,34 @@ def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     if not isinstance(dataset, xr.Dataset):
         with open_dataset(dataset) as opened:
             return resonances(opened)
-    scene = scene_of(dataset, "resonances")
-    name, factor = _swept(dataset, scene)
-    exchanged = energies(dataset)
-    body = impacting_body(scene)
-    order = [name] if "direction" not in dataset["outcome"].dims else ["direction", name]
-    branches = (
-        [str(each) for each in np.atleast_1d(dataset["direction"].values)] if "direction" in order else [""]
-    )
-    frequency = factor * dataset[name].values.astype(np.float64)
-    curves = dict(_curves(dataset, exchanged, order, frequency, body))
+    return whole(PeaksOfSweep(dataset)).dataset
+
+
+def _peaks(curves: Mapping[str, Floats], frequency: Floats) -> list[_Found]:
+    """Return the peaks of curves, each of shape (branch, frequency).
+
+    Raises
+    ------
+    DatasetError
+        There is none.
+    """
     found = [
         _Found(quantity, branch, peak)
-        for quantity, values in curves.items()
-        for branch in range(len(branches))
-        for peak in peaks_of(frequency, values[branch])
+        for quantity, branches in curves.items()
+        for branch, values in enumerate(branches)
+        for peak in peaks_of(frequency, values)
     ]
     if not found:
         raise DatasetError("resonances: expected a response with a peak inside of the sweep, got none.")
-    deepest = _deepest(dataset, body, order, frequency.size)
-    shape = (len(branches), frequency.size)
-    motion = _motions(exchanged, order).reshape(shape)
-    ratio = np.array([deepest[each.branch, each.peak.place] for each in found])
-    shifted = np.full((len(found), body.frequencies.size), np.nan)
+    return found
+
+
+def _shifted(ratio: Floats, body: ImpactingBody) -> Floats:
+    """Return the natural frequencies that a stop shifts, shape (peak, mode)."""
+    shifted = np.full((ratio.size, body.frequencies.size), np.nan)
     known = (ratio > -1.0) & (ratio <= 1.0 + _SAME)
     shifted[known] = frequency_shift(ratio[known])[:, None] * body.frequencies
-    peaks = [each.peak for each in found]
-    values = {
-        "quantity": [each.quantity for each in found],
-        "peak_branch": [each.branch for each in found],
-        "peak_frequency": [each.frequency for each in peaks],
-        "peak_height": [each.height for each in peaks],
-        "grid_step": [each.step for each in peaks],
-        "motion": [str(motion[each.branch, each.peak.place]) for each in found],
-        "stop_ratio": ratio,
-        "shifted_frequency": shifted,
-        "natural_frequency": body.frequencies,
-        **curves,
-        "branch": branches,
-        "forcing": frequency,
-        "mode": np.arange(1, body.frequencies.size + 1),
-    }
-    return TABLE.dataset(values, runs_attributes(dataset.attrs), units=units_of(dataset))
+    return shifted
 
 
 def _swept(dataset: xr.Dataset, scene: Scene) -> tuple[str, float]:
@@ -187,3 +247,23 @@ def _motions(exchanged: xr.Dataset, order: list[str]) -> np.ndarray[tuple[int, .
         for p, q, reason in zip(impacts.ravel(), periods.ravel(), reasons.ravel(), strict=True)
     ]
     return np.array(told, dtype=object)
+
+
+def _cells(found: xr.Dataset) -> Iterator[tuple[str, ...]]:
+    for place in range(found.sizes["peak"]):
+        own = found.isel(peak=place)
+        at = float(own.peak_frequency)
+        ratio = f"{float(own.stop_ratio):.4f}" if np.isfinite(own.stop_ratio) else "-"
+        quantity = str(own.quantity.item()).replace("_", " ")
+        branch = str(found["branch"].values[int(own.peak_branch)])
+        numbers = f"{at:.5g}", f"{float(own.peak_height):.5g}"
+        near = [_nearest(at, own[name].values) for name in ("natural_frequency", "shifted_frequency")]
+        yield quantity, branch, *numbers, str(own.motion.item()), ratio, *near
+
+
+def _nearest(at: float, frequencies: Floats) -> str:
+    """Return the mode whose frequency is nearest to a peak, and how far off the peak is."""
+    if not np.isfinite(frequencies).all():
+        return "-"
+    mode = int(np.argmin(np.abs(np.log(frequencies / at))))
+    return f"{mode + 1}: {frequencies[mode]:.5g} ({100.0 * (at / frequencies[mode] - 1.0):+.1f} %)"

@@ -2,19 +2,99 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset import dataset_file, open_dataset
+from vibroimpact.analysis.dataset.outputs import DATASET_ENDING
 from vibroimpact.analysis.dataset.schema import Outcome, UnitSystem
+from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.recorded import Impacts
-from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.analysis.study import Study
+from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.dataset import coordinate_names
+from vibroimpact.orchestrator.run.progress import shown_progress
+from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.study.preparing import with_modes
+
+Row = TypeVar("Row")
+
+
+class OfRuns(Protocol):
+    """Arguments that say which runs are meant."""
+
+    @property
+    def file(self) -> Path:
+        """Scene or dataset."""
+
+    @property
+    def changes(self) -> Sequence[str] | None:
+        """Changes of the scene, each KEY=VALUE."""
+
+
+@dataclass(eq=False)
+class RunsStudy(Study[Row]):
+    """A study of the runs of a dataset, or of those of a scene, which are run first.
+
+    Parameters
+    ----------
+    runs : xarray.Dataset
+        As `open_dataset` or `run` gives it.
+    """
+
+    runs: xr.Dataset
+
+    @classmethod
+    def reads(cls, options: OfRuns) -> Sequence[Path]:
+        """Return scene or dataset, and the file of a folder."""
+        return [options.file, dataset_file(options.file)]
+
+    @classmethod
+    def prepare(cls, options: OfRuns, stack: ExitStack) -> Self:
+        """Open the runs."""
+        return cls(stack.enter_context(runs_of(options.file, options.changes or ())))
+
+    @property
+    def left_out(self) -> str:
+        """Why runs that were not looked at have no result."""
+        return f"not looked at: {self.incomplete}"
+
+
+@contextmanager
+def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
+    """Open the runs of a dataset; those of a scene are run first.
+
+    Raises
+    ------
+    UsageError
+        The scene is none whose orbits are followed, or a dataset is to be changed.
+    """
+    if path.is_dir() or path.suffix.lower() == DATASET_ENDING:
+        if changes:
+            raise UsageError(
+                f"{path}: --set: expected a scene, which can be changed, got a dataset. Leave it out."
+            )
+        with open_dataset(path) as dataset:
+            yield dataset
+        return
+    scene = with_modes(opened_scene(path, changes))
+    impacting_body(scene)  # refused before it runs
+    with ScratchFolder("energies") as folder:
+        file = Path(folder.name, "run.nc")
+        with shown_progress() as progress:
+            run_scene(scene, file, progress=progress)
+        with open_dataset(file) as dataset:
+            yield dataset
 
 
 def scene_of(dataset: xr.Dataset, who: str) -> Scene:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,7 +16,6 @@ import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.analysis.dataset.results import SECONDS, ResultTable
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.orchestrator.run.provenance import program_attributes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.fields import rule_of
@@ -320,10 +319,8 @@ def _only_fused(document: dict[str, Any]) -> None:
         document["execution"].pop(name, None)
 
 
-def shares_of(
-    scene: Scene, effects: Sequence[Effect], told: Callable[[Share], None] = lambda share: None
-) -> list[Share]:
-    """Run a scene with and without each effect, in turn, and return what each costs and changes, the dearest first.
+def shares_of(scene: Scene, effects: Sequence[Effect]) -> Generator[Share, None, None]:
+    """Run a scene with and without each effect, in turn, and yield what each costs and changes.
 
     Parameters
     ----------
@@ -331,18 +328,17 @@ def shares_of(
         Without a sweep.
     effects : sequence of Effect
         Of this scene.
-    told : callable
-        Given each as soon as it is known.
     """
-    found = []
     compared = _Compared(scene)
     with opened(scene) as full:
         whole = float(np.median([clock.CLOCK.processor_time(full) for _ in range(PAIRS)]))
     for effect in effects:
-        share = _share(effect, whole, compared)
-        told(share)
-        found.append(share)
-    return sorted(found, key=lambda share: -share.share if share.share == share.share else math.inf)
+        yield _share(effect, whole, compared)
+
+
+def dearest_first(share: Share) -> float:
+    """Return what shares are sorted by: the negative share of the time, infinite of one that failed."""
+    return -share.share if share.share == share.share else math.inf
 
 
 @contextmanager
@@ -450,7 +446,6 @@ def dataset_of_shares(
         "title": f"What effects cost: {scene.title or scene.source}",
         "not_simulated": ", ".join(not_called(scene)),
         "scene": scene.text,
-        **program_attributes(),
         **(attributes or {}),
     }
     return TABLE.dataset(values, found, units=scene.units)

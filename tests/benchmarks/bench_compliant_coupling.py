@@ -22,8 +22,8 @@ import xarray as xr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.compliant_parts import coupled, plain_contact
 
+from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.analysis.landmarks import observed_order
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
 
 STEPS = np.array([8, 15, 30, 60, 120, 240])
 STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}

@@ -47,6 +47,7 @@ from support.coupled_parts import (
 )
 from support.fmu_factory import bouncing_ball
 
+from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.packaging.archive import unpack
@@ -54,7 +55,6 @@ from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import EventSpec
 from vibroimpact.orchestrator.run.points import independent_points
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
 from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 

@@ -31,11 +31,11 @@ from support.fmu_factory import mass
 from support.held_parts import held
 from support.pair_parts import hit
 
+from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
 
 STEPS = np.array([8, 15, 30, 60, 120, 240])
 STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}

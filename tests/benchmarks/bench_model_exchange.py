@@ -21,9 +21,9 @@ import numpy as np
 import xarray as xr
 
 import vibroimpact as vi
+from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.shipped import fmu_path
-from vibroimpact.orchestrator.run.provenance import git_commit, versions
 
 TOLERANCES = np.array([1e-4, 1e-6, 1e-8, 1e-10])
 PERIODS = 100

@@ -28,8 +28,9 @@ from scipy.optimize import root
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import find_orbit
 from vibroimpact.analysis.orbits.following import Branch
+from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.follow import Followed, follow_branches
+from vibroimpact.orchestrator.orbits.follow import Following
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FREQUENCY = "forcing.angular_frequency"
@@ -64,9 +65,7 @@ def oscillator() -> vi.Scene:
 
 def branches(scene: vi.Scene, span: tuple[float, float], step: float) -> list[Branch]:
     """Follow P(1,1) and what doubles from it."""
-    followed = Followed(scene, FREQUENCY)
-    follow_branches(scene, FREQUENCY, *span, longest=step, followed=followed)
-    return followed.branches
+    return whole(Following(scene, FREQUENCY, *span, step=step)).followed.branches
 
 
 def doubling_by_sweeps(tolerance: float) -> tuple[float, int]:

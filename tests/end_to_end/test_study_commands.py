@@ -12,9 +12,9 @@ from support.still_clock import stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_measured
-from vibroimpact.orchestrator.commands.accuracy import _shown
+from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy import study_accuracy
+from vibroimpact.orchestrator.study.accuracy import AccuracyOfScene
 
 FREE = """# rings down
 [body]
@@ -112,7 +112,8 @@ def test_in_a_terminal_the_table_grows(
     stop_the_clock(monkeypatch)
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    with _shown("free", "all") as told:
-        study_accuracy(Scene.from_text(FREE), told=told)
+    study = AccuracyOfScene(Scene.from_text(FREE))
+    with study.shown():
+        whole(study)
     said = capsys.readouterr().out
     assert said.index("fused") < said.index("CVode")

@@ -18,9 +18,10 @@ from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.basins import Basins
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.orbits.basins import Plane, prepare_basins, run_basins
-from vibroimpact.orchestrator.orbits.follow import Followed, follow_branches
+from vibroimpact.orchestrator.orbits.basins import BasinsOfScene, Plane
+from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
@@ -83,8 +84,8 @@ def _basins(draw: random.Random, tables: Tables) -> str | None:
     low = -position if len(tables["stop"]) == 2 else -4.0 * position
     speed = 3.0 * position * max(1.0, tables["forcing"]["angular_frequency"])
     plane = Plane((0.999 * low, 0.999 * position), (-speed, speed), (POINTS, POINTS))
-    alone, _, _, found = prepare_basins(scene, plane)
-    run_basins(alone, found)
+    study = whole(BasinsOfScene(scene, plane))
+    alone, found = study.scene, study.known
     if not np.isclose(found.fractions.sum(), found.decided):
         return f"basins: shares add up to {found.fractions.sum()}, {found.decided} are decided"
     runner = PointRunner(
@@ -151,22 +152,21 @@ class _Beside(NamedTuple):
 def _branches(draw: random.Random, tables: Tables) -> str | None:
     scene = Scene.from_dict(tables)
     frequency = tables["forcing"]["angular_frequency"]
-    followed = Followed(scene, FREQUENCY)
     ends = 0.85 * frequency, 1.15 * frequency
     try:
         if draw.random() < 0.4:
-            follow_branches(scene, FREQUENCY, *ends, impacts=1, doublings=0, followed=followed)
+            study = Following(scene, FREQUENCY, *ends, impacts=1, doublings=0)
         else:
             # the orbit that the scene's own run ends on, mostly one that hits both stops
             run = vi.run(scene.with_values({"record": {"transient_periods": 3000, "recorded_periods": 64}}))
             seed = vi.seed_of_run(run)
-            follow_branches(
-                scene, FREQUENCY, *ends, seed=seed.impacts, impacts=len(seed.impacts), periods=seed.periods,
-                doublings=0, followed=followed,
-            )  # fmt: skip
+            study = Following(
+                scene, FREQUENCY, *ends, len(seed.impacts), seed.periods, seed.impacts, doublings=0
+            )
+        branches = whole(study).followed.branches
     except (OrbitError, DatasetError):
         return None  # no orbit there, which it says
-    for branch in followed.branches:
+    for branch in branches:
         problem = _unnamed_change(branch) or _unlike_its_runs(draw, scene, branch)
         if problem is not None:
             return f"follow: {branch.full_name}: {problem}"

@@ -153,10 +153,14 @@ class KindsOfDataset:
             self._make(kind, path)
         return path
 
-    def _make(self, kind: str, path: Path) -> None:
+    def arguments(self, kind: str, rig: str = "") -> list[str | Path]:
+        """Return the words of the command that makes a kind; files that it needs are made."""
         words = re.findall(r"(?:\[[^\]=]+\]|\S)+", KINDS[kind])
-        with self._rig() if "RIG" in words else nullcontext("") as rig:
-            given = [rig if word == "RIG" else self._word(word) for word in words]
+        return [rig if word == "RIG" else self._word(word) for word in words]
+
+    def _make(self, kind: str, path: Path) -> None:
+        with self._rig() if "RIG" in KINDS[kind] else nullcontext("") as rig:
+            given = self.arguments(kind, rig)
             done = in_this_process(*given, "-o", path.parent if kind in FOLDERS else path)
         assert path.exists(), f"{kind}: {done.returncode}: {done.stdout}{done.stderr}"
 

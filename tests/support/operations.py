@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import pkgutil
 
+from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.operations import Operation
 from vibroimpact.orchestrator.commands import table
 
@@ -28,6 +29,9 @@ def of_package(package: str) -> dict[str, type[Operation]]:
 def assert_sound(operation: type[Operation]) -> None:
     """Assert that each argument has words, and that what is run takes the operation and keywords with defaults."""
     assert all(field.words.help for field in operation.fields())
+    if operation.study:
+        assert issubclass(pkgutil.resolve_name(f"vibroimpact.{operation.study}"), Study)
+        return
     parameters = inspect.signature(pkgutil.resolve_name(f"vibroimpact.{operation.runs}")).parameters
     first, *others = parameters.values()
     assert first.annotation == operation.__name__

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from vibroimpact.orchestrator.study.accuracy.choice import advice, refuse_unreached
-from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
+from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measured
 from vibroimpact.orchestrator.study.accuracy.results import dataset_of
-from vibroimpact.orchestrator.study.accuracy.study import BUDGET, study_accuracy
+from vibroimpact.orchestrator.study.accuracy.study import BUDGET, AccuracyOfScene
 
-__all__ = ["BUDGET", "Measured", "Study", "advice", "dataset_of", "refuse_unreached", "study_accuracy"]
+__all__ = ["BUDGET", "AccuracyOfScene", "Comparison", "Measured", "advice", "dataset_of", "refuse_unreached"]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
-from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
+from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measured
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.references import Reference
 
@@ -62,7 +62,7 @@ def error_of_reference(reference: Reference, quantity: str) -> float:
     return reference.error[quantity] if quantity != "all" else max(known, default=math.nan)
 
 
-def refuse_unreached(study: Study) -> None:
+def refuse_unreached(study: Comparison) -> None:
     """Refuse a tolerance that no way has reached, with what was.
 
     Raises
@@ -87,7 +87,7 @@ def refuse_unreached(study: Study) -> None:
     )
 
 
-def advice(study: Study) -> str:
+def advice(study: Comparison) -> str:
     """Return what to choose, in a sentence."""
     chosen, quantity = study.chosen, study.quantity
     if chosen is None:
@@ -113,7 +113,7 @@ def advice(study: Study) -> str:
     return f"{words}."
 
 
-def _for_the_score(study: Study) -> str:
+def _for_the_score(study: Comparison) -> str:
     """Return the cheapest way that a recording does not tell from the chosen one; empty where none is cheaper."""
     chosen = study.chosen
     if chosen is None or not math.isfinite(chosen.variance):
@@ -134,7 +134,7 @@ def _for_the_score(study: Study) -> str:
     )
 
 
-def _why_none(study: Study) -> str:
+def _why_none(study: Comparison) -> str:
     """Return why there is nothing to choose."""
     known = error_of_reference(study.reference, study.quantity)
     if not any(one.error(study.quantity) == one.error(study.quantity) for one in study.measured):

@@ -118,8 +118,8 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
-    """What was found.
+class Comparison:
+    """All ways that were tried, with their reference.
 
     Attributes
     ----------

@@ -10,9 +10,8 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
-from vibroimpact.orchestrator.run.provenance import program_attributes
 from vibroimpact.orchestrator.study.accuracy.choice import advice, error_of_reference, pareto_front
-from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
+from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measured
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES
 from vibroimpact.orchestrator.study.statistics import Statistics
 
@@ -66,7 +65,7 @@ TABLE = ResultTable(
 """Variables of a study; of a replay, of chaos, and errors of what was recorded where there are such."""
 
 
-def dataset_of(study: Study) -> xr.Dataset:
+def dataset_of(study: Comparison) -> xr.Dataset:
     """Return a study as a dataset of kind `accuracy`."""
     found, scene, reference = study.measured, study.scene, study.reference
     attributes = {
@@ -87,7 +86,6 @@ def dataset_of(study: Study) -> xr.Dataset:
         "wall_time": study.effort.wall,
         "waited": study.effort.waited,
         "scene": scene.text,
-        **program_attributes(),
     }
     values = _costs(study) | _errors(study) | (_values_of_chaos(found) if reference.chaotic else {})
     words = {
@@ -99,7 +97,7 @@ def dataset_of(study: Study) -> xr.Dataset:
     return TABLE.dataset(values | words, attributes, quantity=study.quantity)
 
 
-def _costs(study: Study) -> dict[str, Any]:
+def _costs(study: Comparison) -> dict[str, Any]:
     found = study.measured
     return {
         "cost": [one.cost for one in found],
@@ -117,7 +115,7 @@ def _costs(study: Study) -> dict[str, Any]:
     }
 
 
-def _errors(study: Study) -> dict[str, Any]:
+def _errors(study: Comparison) -> dict[str, Any]:
     found = study.measured
     front = pareto_front(found, study.quantity)
     values: dict[str, Any] = {

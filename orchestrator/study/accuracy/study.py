@@ -1,23 +1,30 @@
-"""What accuracy costs in time: a scene, simulated in all ways that it can be, each against the best reference."""
+"""The study `accuracy`: a scene, simulated in all ways that it can be, each against the best reference."""
 
 from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
+import xarray as xr
 
 import vibroimpact.orchestrator.study.clock as clock
-from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.analysis.dataset.outputs import refuse_outputs
+from vibroimpact.analysis.study import Study
+from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.operations.accuracy import Accuracy
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.accuracy.budget import Budget
-from vibroimpact.orchestrator.study.accuracy.choice import cheapest
-from vibroimpact.orchestrator.study.accuracy.measured import Measured, Study
+from vibroimpact.orchestrator.study.accuracy.choice import cheapest, refuse_unreached
+from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measured
+from vibroimpact.orchestrator.study.accuracy.printed import print_comparison, shown, write_tuned
 from vibroimpact.orchestrator.study.accuracy.reach import (
     GUARDED_SHARE,
     RECORDING_SHARE,
@@ -32,12 +39,14 @@ from vibroimpact.orchestrator.study.accuracy.refusals import (
     refuse_one_way,
     refuse_vague_reference,
 )
+from vibroimpact.orchestrator.study.accuracy.results import dataset_of
 from vibroimpact.orchestrator.study.accuracy.trying import References, tried
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.memory import UNKNOWN
 from vibroimpact.orchestrator.study.observation import LATE
 from vibroimpact.orchestrator.study.orbits import orbit_of
+from vibroimpact.orchestrator.study.preparing import with_modes
 from vibroimpact.orchestrator.study.references import (
     DISTURBANCE,
     Reference,
@@ -78,75 +87,139 @@ MOST_FIRST_PERIODS = 4096
 """Periods within which the first impacts are looked for."""
 
 
-def study_accuracy(
-    scene: Scene,
-    *,
-    tolerance: float | None = None,
-    quantity: str = "all",
-    budget: float = BUDGET,
-    told: Callable[[Measured], None] = lambda measured: None,
-) -> Study:
-    """Simulate a scene in all ways that it can be, and measure the error and the cost of each.
+@dataclass(eq=False)
+class AccuracyOfScene(Study[Measured]):
+    """What accuracy costs in time: error and cost of each way of simulating a scene; a row is a way.
 
     Parameters
     ----------
     scene : Scene
-        Its sweep is left out: each swept number has the value of its own table.
+        Its number of modes is known. Its sweep is left out: each swept number has the value of its own table.
     tolerance : float, optional
         Relative error that is asked for.
     quantity : str
         One of `errors.QUANTITIES`, or `all`, the worst of those.
     budget : float
         Processor time that the study takes, of all its processes, within a factor of 1.5, s.
-    told : callable
-        Given each way as soon as it has run once.
-
-    Returns
-    -------
-    Study
-
-    Raises
-    ------
-    UsageError
-        There is no such quantity, nothing to vary, a budget below 10 s or below what this scene needs, or a tolerance
-        that no way can reach: double precision or the reference of the scene does not tell it. No way has run then.
     """
-    refuse_misuse(tolerance, quantity, budget)
-    spends = Budget(budget)
-    alone = studied_scene(scene)
-    refuse_one_way(ways_of(alone), scene)
-    whole = within_reach(alone, spends)
-    passed = transient_passed(whole, spends)
-    reference = reference_of(passed.scene)
-    statistical = passed.scene if reference.chaotic else None
-    orbit = _orbit_of(reference, whole, passed)
-    if reference.chaotic:
-        first = first_impacts(whole, spends)
-        passed = Passed(first, first)
-        reference = replace(reference_of(first), chaotic=True, sensitivity=reference.sensitivity)
-    refuse_vague_reference(tolerance, quantity, reference)
-    given: dict[str, Any] = {
-        "speed": _typical_speed(reference),
-        "rate": _rate_of(scene),
-        "whole": passed.whole,
-    }
-    limited, limited_whole = (
-        limited_elsewhere(one, GUARDED_SHARE * budget) for one in (passed.scene, passed.whole)
-    )
-    ways = ways_of(limited, **given | {"whole": limited_whole})
-    found = _measured(ways, References(reference, passed), passed, given, spends, told, statistical)
-    return Study(
-        passed.scene,
-        reference,
-        found,
-        quantity,
-        math.nan if tolerance is None else tolerance,
-        cheapest(found, tolerance, quantity, reference),
-        orbit,
-        (*remarks_on(scene), *_remarks(alone, whole, passed)),
-        told_by(ways),
-        spends.effort(),
-    )
+
+    name = "accuracy"
+    nothing = "a way that had run"
+
+    scene: Scene
+    tolerance: float | None = None
+    quantity: str = "all"
+    budget: float = BUDGET
+
+    def __post_init__(self) -> None:
+        self._show: Callable[[Measured], None] = lambda one: None
+
+    @classmethod
+    def prepare(cls, options: Accuracy, stack: ExitStack) -> Self:
+        """Open the scene.
+
+        Raises
+        ------
+        UsageError
+            Before anything runs, where the arguments alone show it.
+        """
+        refuse_misuse(options.tolerance, options.of, options.budget)
+        if options.write is not None and options.tolerance is None:
+            raise UsageError("--write: expected a tolerance to tune for, got none. Add --tolerance 1e-6.")
+        opened = opened_scene(options.scene, options.changes or ())
+        if options.write is not None:
+            refuse_outputs([options.scene], options.write, ending=".toml")
+        refuse_outputs(opened.files, options.output, options.figure)
+        return cls(with_modes(opened), options.tolerance, options.of, options.budget)
+
+    def rows(self) -> Generator[Measured, None, None]:
+        """Run all ways once, then in turn, and last in processes of their own.
+
+        Raises
+        ------
+        UsageError
+            There is no such quantity, nothing to vary, a budget below 10 s or below what this scene needs, or a
+            tolerance that no way can reach: double precision or the reference of the scene does not tell it. No way has
+            run then.
+        """
+        refuse_misuse(self.tolerance, self.quantity, self.budget)
+        self._spends = Budget(self.budget)
+        self._alone = studied_scene(self.scene)
+        refuse_one_way(ways_of(self._alone), self.scene)
+        self._within = within_reach(self._alone, self._spends)
+        passed = transient_passed(self._within, self._spends)
+        reference = reference_of(passed.scene)
+        statistical = passed.scene if reference.chaotic else None
+        self._orbit = _orbit_of(reference, self._within, passed)
+        if reference.chaotic:
+            first = first_impacts(self._within, self._spends)
+            passed = Passed(first, first)
+            reference = replace(reference_of(first), chaotic=True, sensitivity=reference.sensitivity)
+        refuse_vague_reference(self.tolerance, self.quantity, reference)
+        self._reference, self._passed = reference, passed
+        given: dict[str, Any] = {
+            "speed": _typical_speed(reference),
+            "rate": _rate_of(self.scene),
+            "whole": passed.whole,
+        }
+        limited, limited_whole = (
+            limited_elsewhere(one, GUARDED_SHARE * self.budget) for one in (passed.scene, passed.whole)
+        )
+        self._ways = ways_of(limited, **given | {"whole": limited_whole})
+        references = References(reference, passed)
+        yield from _measured(self._ways, references, passed, given, self._spends, statistical)
+
+    def shown(self) -> AbstractContextManager[None]:
+        """Show each way as soon as it has run once."""
+        return self._shown()
+
+    @contextmanager
+    def _shown(self) -> Iterator[None]:
+        with shown(self.scene.title or self.scene.source, self.quantity) as self._show:
+            yield
+
+    def take(self, row: Measured) -> None:
+        """Keep and show a way."""
+        super().take(row)
+        self._show(row)
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        """All ways that were tried, when no more come."""
+        remarks = (*remarks_on(self.scene), *_remarks(self._alone, self._within, self._passed))
+        return Comparison(
+            self._passed.scene,
+            self._reference,
+            self.found,
+            self.quantity,
+            math.nan if self.tolerance is None else self.tolerance,
+            cheapest(self.found, self.tolerance, self.quantity, self._reference),
+            self._orbit,
+            remarks,
+            told_by(self._ways),
+            self._spends.effort(),
+        )
+
+    def made(self) -> xr.Dataset:
+        """Return the ways with their errors and costs."""
+        return dataset_of(self.comparison)
+
+    def print_results(self) -> None:
+        """Print the ways, and what to choose."""
+        print_comparison(self.comparison)
+
+    def conclude(self, options: Accuracy) -> None:
+        """Refuse a tolerance that no way has reached, and write the scene with the way that does.
+
+        Raises
+        ------
+        UsageError
+        """
+        if self.incomplete:
+            return
+        refuse_unreached(self.comparison)
+        if options.write is not None:
+            write_tuned(self.scene.text, self.comparison, options.write)
 
 
 def _measured(
@@ -155,10 +228,9 @@ def _measured(
     passed: Passed,
     given: Mapping[str, Any],
     spends: Budget,
-    told: Callable[[Measured], None],
     statistical: Scene | None,
-) -> list[Measured]:
-    """Run all ways once, then in turn, and last in processes of their own; return what came of each."""
+) -> Generator[Measured, None, None]:
+    """Yield each way when it has run once; then run all in turn, and last in processes of their own."""
     found: list[Measured] = []
     with ExitStack() as stack:
         able: list[tuple[Measured, Trial]] = []
@@ -169,13 +241,12 @@ def _measured(
                 spends.note(one.first, one.first_wall)
                 stack.callback(trial.close)
                 able.append((one, trial))
-            told(one)
             found.append(one)
+            yield one
         if statistical is not None:
             _add_statistics(statistical, found, references.reference, spends)
         _time_in_turn(able, spends)
     _add_memory(passed.scene, given, ways, [one for one, _ in able], spends)
-    return found
 
 
 def studied_scene(scene: Scene) -> Scene:

@@ -11,8 +11,10 @@ from support.places import EXAMPLES
 
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import PeriodicOrbit
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.core.modes import chain_modes
-from vibroimpact.orchestrator.orbits.follow import Followed, follow_branches
+from vibroimpact.orchestrator.orbits.branches import Followed
+from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.study.ways.equal_restitution import laws_of_equal_restitution
 
 FREQUENCY = "forcing.angular_frequency"
@@ -37,9 +39,7 @@ def scene(path: Path, **changes: Any) -> vi.Scene:
 @pytest.fixture(scope="module")
 def chain() -> Followed:
     """Return the branches of the chain of the thesis."""
-    followed = Followed(scene(CHAIN), FREQUENCY)
-    follow_branches(followed.scene, FREQUENCY, 0.3, 2.2, doublings=2, followed=followed)
-    return followed
+    return whole(Following(scene(CHAIN), FREQUENCY, 0.3, 2.2, doublings=2)).followed
 
 
 def run_from(orbit: PeriodicOrbit, frequency: float) -> tuple[str, Any]:
@@ -104,8 +104,8 @@ def test_a_chain_of_one_mass_has_the_points_of_the_oscillator() -> None:
         "[forcing]\namplitude = [0.5]\nangular_frequency = 1.0\n"
         "[[stop]]\nposition = 1.0\nrestitution = 0.7\n[record]\nrecorded_periods = 2\n"
     )
-    followed = Followed(vi.Scene.from_text(text), FREQUENCY)
-    follow_branches(followed.scene, FREQUENCY, 0.6, 1.6, followed=followed, doublings=0, longest=0.05)
+    study = Following(vi.Scene.from_text(text), FREQUENCY, 0.6, 1.6, doublings=0, step=0.05)
+    followed = whole(study).followed
     found = sorted(point.at.value for branch in followed.branches for point in branch.points)
     expected = [0.7106873690939, 0.9364931207, 1.2185743569476, 1.5166110861]
     assert found == pytest.approx(expected, abs=1e-9)

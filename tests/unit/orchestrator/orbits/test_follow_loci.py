@@ -13,7 +13,9 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.search import orbits_of
-from vibroimpact.orchestrator.orbits.follow import FollowedLoci, follow_branches, follow_loci
+from vibroimpact.analysis.study import whole
+from vibroimpact.orchestrator.orbits.branches import FollowedLoci, follow_loci
+from vibroimpact.orchestrator.orbits.follow import Following
 
 CHAIN = ROOT / "examples" / "thesis" / "figure_6_13.toml"
 PARAMETER = "forcing.angular_frequency"
@@ -37,11 +39,13 @@ def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings(
 
 
 def curves_of_grazes_between_impacts(scene: vi.Scene, impacts: int) -> FollowedLoci:
-    branches = follow_branches(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, longest=0.05)
+    branches = whole(Following(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, step=0.05)).followed
     for branch in branches.branches:
         branch.points = [point for point in branch.points if point.kind == "graze between impacts"][:1]
     ranges = FollowSettings(0.4, 0.52, 0.03), FollowSettings(0.09, 0.6, 0.03)
-    return follow_loci(FollowedLoci(branches, POSITION), *ranges)
+    loci = FollowedLoci(branches, POSITION)
+    assert list(follow_loci(loci, *ranges))
+    return loci
 
 
 def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_speed(
@@ -61,18 +65,19 @@ def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_spee
 @pytest.mark.parametrize("longest", [0.01, 0.2])
 def test_a_branch_is_followed_once_however_far_its_orbits_lie_apart(longest: float) -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372})
-    found = follow_branches(scene, PARAMETER, 1.6, 2.2, longest=longest, doublings=0)
+    found = whole(Following(scene, PARAMETER, 1.6, 2.2, step=longest, doublings=0)).followed
     assert [branch.name for branch in found.branches] == ["P(1,1)"]
 
 
 @pytest.mark.long
 def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_of_these_grazes() -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372, PARAMETER: 1.75})
-    branches = follow_branches(scene, PARAMETER, 1.6, 2.2, longest=0.05)
+    branches = whole(Following(scene, PARAMETER, 1.6, 2.2, step=0.05)).followed
     for branch in branches.branches:
         branch.points = branch.points[-2:] if branch.name == "P(2,2)" else []
     ranges = FollowSettings(1.6, 2.2, 0.01), FollowSettings(0.03, 0.05, 0.01)
-    loci = follow_loci(FollowedLoci(branches, POSITION), *ranges)
+    loci = FollowedLoci(branches, POSITION)
+    assert list(follow_loci(loci, *ranges))
     (met,) = [
         point.values
         for locus in loci.loci
@@ -80,7 +85,7 @@ def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_o
         if kind == "graze between impacts"
     ]
     assert met == pytest.approx((1.7725763745, 0.037100299463), abs=1e-9)
-    alone = follow_branches(scene.with_values({POSITION: met[1]}), PARAMETER, 1.6, 2.2, longest=0.05)
+    alone = whole(Following(scene.with_values({POSITION: met[1]}), PARAMETER, 1.6, 2.2, step=0.05)).followed
     last = [point for point in alone.branches[1].points if point.kind == "graze between impacts"]
     assert last[0].at.value == pytest.approx(met[0], abs=1e-9)
 

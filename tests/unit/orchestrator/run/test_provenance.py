@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from vibroimpact.orchestrator.run import provenance
+from vibroimpact.analysis.dataset import provenance
 
 
 def test_git_is_asked_once_in_a_process(monkeypatch: pytest.MonkeyPatch) -> None:

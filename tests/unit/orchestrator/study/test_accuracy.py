@@ -17,11 +17,12 @@ from support.still_clock import NEVER_LATE, let_nothing_run, stop_the_clock
 
 import vibroimpact as vi
 from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.commands.accuracy import table_of
 from vibroimpact.orchestrator.scene import Scene, load_scene
-from vibroimpact.orchestrator.study.accuracy import Measured, Study, advice, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import AccuracyOfScene, Comparison, advice, dataset_of
 from vibroimpact.orchestrator.study.accuracy.choice import cheapest, error_of_reference, refuse_unreached
+from vibroimpact.orchestrator.study.accuracy.printed import table_of
 from vibroimpact.orchestrator.study.accuracy.study import studied_scene
 from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.memory import IS_MEASURED, memory_of_ways
@@ -53,32 +54,32 @@ COARSE: dict[str, Any] = {"STEPS_A_PERIOD": (23, 61), "REVISED_CONTACT_STEPS": (
 """Settings of ways with equal steps, or steps that are made again: finer ones take most of the time of a study."""
 
 
-def studied_once(scene: Scene, settings: dict[str, Any] = COARSE, **options: Any) -> Study:
-    """Study a scene in all ways, by some settings of them, without measuring what they cost."""
+def studied_once(scene: Scene, settings: dict[str, Any] = COARSE, **options: Any) -> Comparison:
+    """Comparison a scene in all ways, by some settings of them, without measuring what they cost."""
     with pytest.MonkeyPatch.context() as patch:
         stop_the_clock(patch)
         for name, values in settings.items():
             patch.setattr(all_ways, name, values)
-        return study_accuracy(scene, budget=NEVER_LATE, **options)
+        return whole(AccuracyOfScene(scene, budget=NEVER_LATE, **options)).comparison
 
 
 @pytest.fixture(scope="module")
-def rigid() -> Study:
+def rigid() -> Comparison:
     return studied_once(Scene.from_dict(P11), {}, tolerance=1e-6)
 
 
 @pytest.fixture(scope="module")
-def yielding() -> Study:
+def yielding() -> Comparison:
     plain = {"STEPS_A_PERIOD": COARSE["STEPS_A_PERIOD"]}
     return studied_once(Scene.from_dict(HERTZ), plain, tolerance=1e-7)
 
 
-def ladder(study: Study, name: str) -> tuple[np.ndarray, np.ndarray]:
+def ladder(study: Comparison, name: str) -> tuple[np.ndarray, np.ndarray]:
     its = [one for one in study.measured if one.way.name == name and not one.errors.failure]
     return np.array([one.way.setting for one in its]), np.array([one.error("all") for one in its])
 
 
-def test_a_periodic_motion_is_compared_with_its_closed_form(rigid: Study) -> None:
+def test_a_periodic_motion_is_compared_with_its_closed_form(rigid: Comparison) -> None:
     assert rigid.orbit == "P(1,1)"
     assert rigid.reference.name == "the closed form of the P(1,1) motion"
     assert not rigid.reference.chaotic
@@ -89,7 +90,7 @@ def test_a_periodic_motion_is_compared_with_its_closed_form(rigid: Study) -> Non
     assert advice(rigid).startswith("Take fused: a relative error of < ")
 
 
-def test_plain_steps_are_of_first_order_and_an_integrator_follows_its_tolerance(rigid: Study) -> None:
+def test_plain_steps_are_of_first_order_and_an_integrator_follows_its_tolerance(rigid: Comparison) -> None:
     steps, errors = ladder(rigid, "plain steps")
     assert len(steps) >= 3
     assert 0.5 < observed_order(steps, errors) < 1.6
@@ -101,7 +102,7 @@ def test_plain_steps_are_of_first_order_and_an_integrator_follows_its_tolerance(
 
 @pytest.mark.parametrize("law", ["Kelvin-Voigt", "Hunt-Crossley"])
 def test_another_law_of_equal_restitution_is_an_error_of_the_model_and_never_chosen(
-    rigid: Study, law: str
+    rigid: Comparison, law: str
 ) -> None:
     times, errors = ladder(rigid, f"{law} stops of equal restitution")
     assert observed_order(times, errors) == pytest.approx(1.0, abs=0.2)
@@ -109,7 +110,7 @@ def test_another_law_of_equal_restitution_is_an_error_of_the_model_and_never_cho
     assert not (dataset.is_model & dataset.on_front).any()
 
 
-def test_a_tolerance_of_integrated_contacts_buys_what_it_says(yielding: Study) -> None:
+def test_a_tolerance_of_integrated_contacts_buys_what_it_says(yielding: Comparison) -> None:
     tolerances, errors = ladder(yielding, "fused")
     assert list(tolerances) == [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
     assert np.all(errors <= np.maximum(10.0 * tolerances, 1e-11))
@@ -119,7 +120,7 @@ def test_a_tolerance_of_integrated_contacts_buys_what_it_says(yielding: Study) -
 
 
 def test_step_revision_finds_rigid_stops_to_rounding_and_follows_yielding_ones_at_second_order(
-    rigid: Study, yielding: Study
+    rigid: Comparison, yielding: Comparison
 ) -> None:
     _, errors = ladder(rigid, "step revision")
     assert len(errors) == 2
@@ -344,7 +345,7 @@ def test_what_it_costs_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, values in COARSE.items():
         monkeypatch.setattr(all_ways, name, values)
     short = Scene.from_dict(P11 | {"record": {"recorded_periods": 2}})
-    study = study_accuracy(short, tolerance=1e-6, budget=20.0)
+    study = whole(AccuracyOfScene(short, tolerance=1e-6, budget=20.0)).comparison
     fused, coupled = study.measured[:2]
     able = [one for one in study.measured if not one.way.model and one.error("all") <= 1e-7]
     assert study.chosen is min(able, key=lambda one: one.cost)  # by what was measured, not by who should win
@@ -360,7 +361,7 @@ def test_what_it_costs_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(("width", "has_all"), [(80, False), (140, True)])
 def test_a_narrow_terminal_has_fewer_columns_and_the_names_of_all_ways(
-    rigid: Study, width: int, has_all: bool
+    rigid: Comparison, width: int, has_all: bool
 ) -> None:
     console = Console(width=width, record=True, file=io.StringIO())
     console.print(table_of("one", rigid.measured, "all", 0.0, width, 40.0))
@@ -371,7 +372,7 @@ def test_a_narrow_terminal_has_fewer_columns_and_the_names_of_all_ways(
     assert "\N{HORIZONTAL ELLIPSIS}" not in text
 
 
-def test_the_dataset_says_what_was_found(rigid: Study) -> None:
+def test_the_dataset_says_what_was_found(rigid: Comparison) -> None:
     dataset = dataset_of(rigid)
     assert dataset.attrs["chosen"] == "fused"
     assert dataset.attrs["motion"] == "not chaotic"
@@ -512,7 +513,7 @@ def test_a_free_motion_without_stops_is_compared_by_its_end() -> None:
     assert np.all(np.diff(errors) < 0.0)
 
 
-def test_what_cannot_be_compared_is_said(rigid: Study) -> None:
+def test_what_cannot_be_compared_is_said(rigid: Comparison) -> None:
     still = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 1.0}}
     assert advice(studied_once(Scene.from_dict(still))).startswith("Nothing that is recorded moves")
     vague = replace(rigid.reference, error=dict.fromkeys(rigid.reference.error, 1.0))
@@ -552,15 +553,15 @@ def test_what_the_arguments_alone_show_is_refused_before_anything_runs(
 def test_a_tolerance_below_what_the_reference_is_known_to_is_refused_before_any_way_runs() -> None:
     scene = Scene.from_dict(FREE)
     known = error_of_reference(reference_of(studied_scene(scene)), "all")
-    tried: list[Measured] = []
+    study = AccuracyOfScene(scene, tolerance=0.9 * known)
     with pytest.raises(
         UsageError, match=r"expected a relative error of .*e-14 or more, to which the reference"
     ):
-        study_accuracy(scene, tolerance=0.9 * known, told=tried.append)
-    assert not tried
+        whole(study)
+    assert study.is_empty
 
 
-def test_a_tolerance_that_no_way_reaches_says_what_was_reached(rigid: Study) -> None:
+def test_a_tolerance_that_no_way_reaches_says_what_was_reached(rigid: Comparison) -> None:
     missed = replace(rigid, tolerance=1e-15, chosen=None)
     with pytest.raises(
         UsageError, match=r"got 1e-15; reached was .*e-1.* by .*, the reference known to .e-1"

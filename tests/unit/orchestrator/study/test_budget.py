@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from support.ticking_clock import TickingClock, tick_the_clock
 
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy, trying
+from vibroimpact.orchestrator.study.accuracy import AccuracyOfScene, Comparison, Measured, dataset_of, trying
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET, Budget
 from vibroimpact.orchestrator.study.accuracy.reach import limited_elsewhere, transient_passed
 from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
@@ -39,8 +40,8 @@ LOOKS = 2
 """Looks at the clock in each of them: of the way, and of the driver of the body."""
 
 
-def studied(scene: Scene, clock: TickingClock, budget: float = LEAST_BUDGET) -> Study:
-    """Study a scene by fused runs and plain steps, with the costs that a clock tells."""
+def studied(scene: Scene, clock: TickingClock, budget: float = LEAST_BUDGET) -> Comparison:
+    """Comparison a scene by fused runs and plain steps, with the costs that a clock tells."""
     with pytest.MonkeyPatch.context() as patch:
         tick_the_clock(patch, clock)
         patch.setattr(all_ways, "STEPS_A_PERIOD", STEPS)
@@ -48,20 +49,20 @@ def studied(scene: Scene, clock: TickingClock, budget: float = LEAST_BUDGET) -> 
             patch.setattr(all_ways, others, lambda scene: [])
         patch.setattr(all_ways, "other_models", lambda scene, speed: [])
         patch.setattr(f"{ROOM}.study.MOST_ROUNDS", 2)
-        return study_accuracy(scene, budget=budget)
+        return whole(AccuracyOfScene(scene, budget=budget)).comparison
 
 
-def plain(study: Study) -> list[Measured]:
+def plain(study: Comparison) -> list[Measured]:
     return [one for one in study.measured if one.way.name == "plain steps"]
 
 
 @pytest.fixture(scope="module")
-def halved() -> Study:
+def halved() -> Comparison:
     # 127 steps in each of 8 periods: 10 s, where the runs of the last way may take 3 s
     return studied(Scene.from_dict(P11), TickingClock(tick=0.005))
 
 
-def test_the_time_is_halved_until_each_way_ends(halved: Study) -> None:
+def test_the_time_is_halved_until_each_way_ends(halved: Comparison) -> None:
     parts = [one.part for one in plain(halved)]
     assert not any(one.errors.failure == "did not finish" for one in halved.measured)
     assert parts == sorted(parts, reverse=True)
@@ -70,7 +71,7 @@ def test_the_time_is_halved_until_each_way_ends(halved: Study) -> None:
     assert all(one.error("all") > 0.0 for one in plain(halved) if not one.errors.failure)
 
 
-def test_cost_over_all_of_the_time_is_extrapolated_and_marked(halved: Study) -> None:
+def test_cost_over_all_of_the_time_is_extrapolated_and_marked(halved: Comparison) -> None:
     for one, steps in zip(plain(halved), STEPS, strict=True):
         assert one.cost == pytest.approx(0.005 * LOOKS * steps * 8, rel=0.1)
         assert one.cost_of_one(halved.periods) == pytest.approx(0.005 * LOOKS * steps, rel=0.1)

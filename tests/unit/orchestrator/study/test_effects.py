@@ -10,8 +10,10 @@ from support.places import EXAMPLES
 from support.still_clock import let_nothing_run, stop_the_clock
 
 import vibroimpact as vi
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.study.cost_of_effects import CostOfEffects
 from vibroimpact.orchestrator.study.effects import effects_of, not_called, shares_of
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.motion import changes_of_motion, sampling_of_change
@@ -66,7 +68,7 @@ def test_what_is_kept_changes_no_motion_and_what_moves_does(monkeypatch: pytest.
     # 67,000 samples are nearly all of the run, so that no other process changes the order
     record = BEAM["record"] | {"time_series": {"rate": 100_000.0}}
     scene = Scene.from_dict(BEAM | {"record": record})
-    shares = {share.effect.name: share for share in shares_of(scene, effects_of(scene))}
+    shares = {share.effect.name: share for share in whole(CostOfEffects(scene)).shares}
     assert next(iter(shares)) == "time series"  # the dearest
     assert shares["time series"].share > 0.5
     assert shares["time series"].change == 0.0

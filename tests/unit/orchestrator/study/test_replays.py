@@ -10,10 +10,11 @@ from support.replay_scenes import BOARD, channel, pulse, written
 from support.still_clock import NEVER_LATE, stop_the_clock
 
 from vibroimpact.analysis.recording import Recording
+from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.replay import opened_replays
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.study.accuracy import Study, advice, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import AccuracyOfScene, Comparison, advice, dataset_of
 from vibroimpact.orchestrator.study.effects import effects_of, shares_of
 from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of, thinned
 
@@ -38,20 +39,20 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def study(scene: Scene) -> Study:
+def study(scene: Scene) -> Comparison:
     with pytest.MonkeyPatch.context() as patch:
         stop_the_clock(patch)
-        return study_accuracy(scene, budget=NEVER_LATE)
+        return whole(AccuracyOfScene(scene, budget=NEVER_LATE)).comparison
 
 
-def test_the_modes_that_the_truth_has_account_for_all_of_the_recording(study: Study) -> None:
+def test_the_modes_that_the_truth_has_account_for_all_of_the_recording(study: Comparison) -> None:
     scores = {one.way.setting: one.variance for one in study.measured if one.way.knob == "modes"}
     assert scores[4] == pytest.approx(100.0, abs=1e-6)
     assert scores[1] < scores[4] - 1e-3  # a slow pulse: the higher modes do little
     assert all(one.way.model for one in study.measured if one.way.knob == "modes")
 
 
-def test_fewer_samples_err_by_more_and_cost_less(study: Study) -> None:
+def test_fewer_samples_err_by_more_and_cost_less(study: Comparison) -> None:
     fewer = [one for one in study.measured if one.way.name == "fewer samples"]
     rates = [one.way.setting for one in fewer]
     assert rates == pytest.approx([25000.0, 12500.0, 6250.0, 3125.0])
@@ -61,12 +62,12 @@ def test_fewer_samples_err_by_more_and_cost_less(study: Study) -> None:
     assert np.isnan([one.error("final_state") for one in fewer]).all()
 
 
-def test_coupled_by_a_replay_fmu_is_the_same_motion(study: Study) -> None:
+def test_coupled_by_a_replay_fmu_is_the_same_motion(study: Comparison) -> None:
     (coupled,) = (one for one in study.measured if one.way.name.startswith("coupled"))
     assert coupled.error("all") < 1e-9
 
 
-def test_the_dataset_and_the_sentence_have_the_score(study: Study) -> None:
+def test_the_dataset_and_the_sentence_have_the_score(study: Comparison) -> None:
     dataset = dataset_of(study)
     scores = dataset["variance_accounted_for"]
     assert scores.attrs["units"] == "percent"
@@ -90,7 +91,7 @@ def test_a_recording_is_not_thinned_to_nothing(scene: Scene) -> None:
 
 def test_a_replay_without_a_recording_is_one_error() -> None:
     with pytest.raises(UsageError, match=r"replay\.recordings: expected a recording, got none"):
-        study_accuracy(parse_scene(BOARD, "board.toml"))
+        whole(AccuracyOfScene(parse_scene(BOARD, "board.toml")))
 
 
 def test_damping_drive_and_sensor_of_a_replay_are_effects(

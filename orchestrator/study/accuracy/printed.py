@@ -1,4 +1,4 @@
-"""What `vibroimpact accuracy` does: it shows what accuracy costs in time, for a person's own scene."""
+"""What is printed of the ways of simulating a scene, and the scene that is written with the one that was chosen."""
 
 from __future__ import annotations
 
@@ -11,19 +11,13 @@ from pathlib import Path
 from rich.live import Live
 from rich.table import Table
 
-from vibroimpact.analysis.commands.found import refuse_places, write_found
-from vibroimpact.analysis.dataset.outputs import refuse_outputs
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import duration
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
-from vibroimpact.orchestrator.commands.check import duration
-from vibroimpact.orchestrator.commands.preparing import with_modes
-from vibroimpact.orchestrator.operations.accuracy import Accuracy
-from vibroimpact.orchestrator.ssp import opened_scene
-from vibroimpact.orchestrator.study.accuracy import Measured, Study, dataset_of, study_accuracy
-from vibroimpact.orchestrator.study.accuracy.choice import advice, error_of_reference, refuse_unreached
-from vibroimpact.orchestrator.study.accuracy.refusals import refuse_misuse
+from vibroimpact.orchestrator.study.accuracy.choice import advice, error_of_reference
+from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measured
 from vibroimpact.orchestrator.study.accuracy.tuned import tuned_text
 
 MEGABYTE = 1e6
@@ -31,36 +25,8 @@ WIDE = 120
 """Letters in a line of a terminal from which on the table has all columns; the dataset has them in any case."""
 
 
-def study_scene(options: Accuracy) -> None:
-    """Study a scene, print a table and what to choose, and write what was asked for.
-
-    Raises
-    ------
-    UsageError
-        Before anything runs, where the arguments alone show it.
-    """
-    tolerance, quantity, path, write = options.tolerance, options.of, options.scene, options.write
-    refuse_misuse(tolerance, quantity, options.budget)
-    if write is not None and tolerance is None:
-        raise UsageError("--write: expected a tolerance to tune for, got none. Add --tolerance 1e-6.")
-    opened = opened_scene(path, options.changes or ())
-    if write is not None:
-        refuse_outputs([path], write, ending=".toml")
-    refuse_places(options, [path, *opened.files], results_kind="accuracy", scene_file=str(path))
-    scene = with_modes(opened)
-    with _shown(scene.title or scene.source, quantity) as told:
-        study = study_accuracy(
-            scene, tolerance=tolerance, quantity=quantity, budget=options.budget, told=told
-        )
-    _print(study)
-    write_found(dataset_of(study).assign_attrs(scene_file=str(path)), "accuracy", options)
-    refuse_unreached(study)
-    if write is not None:
-        _write_tuned(scene.text, study, write)
-
-
 @contextmanager
-def _shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
+def shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
     """Show each way as soon as it has run once: in a terminal a table that grows, else a line."""
     if not sys.stdout.isatty():
         yield _say_tried
@@ -145,26 +111,36 @@ def _known_duration(seconds: float) -> str:
     return "-" if math.isnan(seconds) else duration(seconds)
 
 
-def _print(study: Study) -> None:
-    known = error_of_reference(study.reference, study.quantity)
-    console, title = wide_terminal(), study.scene.title or study.scene.source
-    console.print(table_of(title, study.measured, study.quantity, known, console.width, study.periods))
-    motion = f"Motion: {study.orbit}. " if study.orbit else ""
-    say(f"{motion}Reference: {study.reference.name}, known to {known:.0e}.")
-    if study.modes_reference:
-        say(f"Other numbers of modes are compared with {study.modes_reference}.")
-    for remark in study.remarks:
+def print_comparison(compared: Comparison) -> None:
+    """Print the ways, what was left out, and what to choose."""
+    known = error_of_reference(compared.reference, compared.quantity)
+    console, title = wide_terminal(), compared.scene.title or compared.scene.source
+    console.print(
+        table_of(title, compared.measured, compared.quantity, known, console.width, compared.periods)
+    )
+    motion = f"Motion: {compared.orbit}. " if compared.orbit else ""
+    say(f"{motion}Reference: {compared.reference.name}, known to {known:.0e}.")
+    if compared.modes_reference:
+        say(f"Other numbers of modes are compared with {compared.modes_reference}.")
+    for remark in compared.remarks:
         say(f"Left out: {remark}.")
-    if any(one.is_extrapolated for one in study.measured):
+    if any(one.is_extrapolated for one in compared.measured):
         say("~: cost extrapolated from the first part of the time; the error is that of this part.")
-    say(study.effort.in_words())
-    say(advice(study))
+    say(compared.effort.in_words())
+    say(advice(compared))
 
 
-def _write_tuned(text: str, study: Study, target: Path) -> None:
-    chosen = study.chosen
+def write_tuned(text: str, compared: Comparison, target: Path) -> None:
+    """Write a scene with the settings of the way that was chosen.
+
+    Raises
+    ------
+    UsageError
+        A scene cannot ask for this way.
+    """
+    chosen = compared.chosen
     assert chosen is not None  # else refused
-    known = error_of_reference(study.reference, study.quantity)
+    known = error_of_reference(compared.reference, compared.quantity)
     settings = {key.partition(".")[2]: value for key, value in chosen.way.changes.items()}
     if not settings:
         raise UsageError(
@@ -172,8 +148,8 @@ def _write_tuned(text: str, study: Study, target: Path) -> None:
             "It is the cheapest all the same."
         )
     reason = (
-        f"{chosen.way.label}: {study.quantity.replace('_', ' ')} to {chosen.told(study.quantity, known)} "
-        f"(asked: {study.tolerance:g}), {duration(chosen.cost)} a run; vibroimpact accuracy"
+        f"{chosen.way.label}: {compared.quantity.replace('_', ' ')} to {chosen.told(compared.quantity, known)} "
+        f"(asked: {compared.tolerance:g}), {duration(chosen.cost)} a run; vibroimpact accuracy"
     )
     write_atomically(target, tuned_text(text, settings, reason).encode("utf-8"))
     say(f"Scene written to {target}.")

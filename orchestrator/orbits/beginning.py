@@ -45,11 +45,6 @@ class Beginning(Protocol):
         """Index of that run."""
 
 
-def is_seed(options: Beginning) -> bool:
-    """Tell whether one orbit is meant, near to impacts that are given."""
-    return options.seed is not None or options.from_dataset is not None
-
-
 def files_of(options: Beginning) -> list[Path]:
     """Return the files that are read for it."""
     return [] if options.from_dataset is None else [options.from_dataset]

@@ -1,0 +1,439 @@
+"""Branches of a scene's periodic orbits over one of its numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits.branches import dataset_of_branches, dataset_of_loci
+from vibroimpact.analysis.orbits.following import (
+    Branch,
+    BranchOrbit,
+    Follower,
+    FollowSettings,
+    SpecialPoint,
+    joined,
+)
+from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
+from vibroimpact.fmus.core.orbits import MOST_IMPACTS
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.messages import Argument, Either, Message, message
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.find import orbit_of_run
+from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
+from vibroimpact.orchestrator.orbits.seeds import Seed
+from vibroimpact.orchestrator.run.dataset import cf_unit
+from vibroimpact.orchestrator.run.provenance import scene_attributes
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.keys import coordinate_name
+
+HISTORY = "periodic orbits followed by vibroimpact"
+SAME_ORBIT = 0.02
+"""Distance, over the range of the parameter and a radian, at which an orbit is on a branch that is known."""
+
+Followings = Iterator[tuple[Branch, BranchOrbit]]
+"""Each orbit that is followed, and the branch whose last it is."""
+
+
+@dataclass(slots=True)
+class Followed:
+    """What was followed.
+
+    Attributes
+    ----------
+    scene : Scene
+    parameter : str
+        Key of the scene.
+    branches : list of Branch
+        Grows while they are followed.
+    """
+
+    scene: Scene
+    parameter: str
+    branches: list[Branch] = field(default_factory=list)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Of the file of its orbits."""
+        return scene_attributes(self.scene, HISTORY) | {"parameter": self.parameter}
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The orbits as runs."""
+        return dataset_of_branches(
+            [branch for branch in self.branches if branch.orbits],
+            coordinate=coordinate_name(self.parameter, [self.parameter]),
+            unit=cf_unit(self.scene, self.parameter) or "1",
+            units=self.scene.units,
+            attrs=self.attributes,
+        )
+
+
+@dataclass(slots=True)
+class FollowedLoci:
+    """Bifurcations that were followed over two parameters.
+
+    Attributes
+    ----------
+    followed : Followed
+        The branches on which they were found.
+    second : str
+        Key of the second parameter.
+    loci : list of Locus
+        Grows while they are followed.
+    """
+
+    followed: Followed
+    second: str
+    loci: list[Locus] = field(default_factory=list)
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Their orbits as runs."""
+        scene, keys = self.followed.scene, [self.followed.parameter, self.second]
+        names = coordinate_name(keys[0], keys), coordinate_name(keys[1], keys)
+        return dataset_of_loci(
+            self.loci,
+            coordinates=names,
+            unit_of={name: cf_unit(scene, key) or "1" for name, key in zip(names, keys, strict=True)},
+            units=scene.units,
+            attrs=self.followed.attributes
+            | {
+                "second_parameter": self.second,
+                "curves": "\n".join(self.names),
+                "not_looked_for": self.left_out,
+            },
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """What each curve is, and the branch on which it was found."""
+        return [
+            f"{number}  {locus.kind} of {locus.points[0].orbit.full_name}; begun from {locus.origin}"
+            for number, locus in enumerate(self.loci, start=1)
+        ]
+
+    @property
+    def left_out(self) -> str:
+        """What was not looked for, as a sentence."""
+        scene, points = (
+            self.followed.scene,
+            [point for each in self.followed.branches for point in each.points],
+        )
+        said = (
+            f"Curves were begun only where a branch has a {', '.join(FOLLOWED_KINDS[:-1])} or {FOLLOWED_KINDS[-1]} at "
+            f"{self.second} = {scene.value(self.second):g}: others, and those that leave points of codimension 2, were "
+            f"not looked for. Begin at other values of {self.second} to find more."
+        )
+        others = [point for point in points if point.kind not in FOLLOWED_KINDS]
+        if others:
+            where = ", ".join(f"{point.kind} at {point.at.value:.8g}" for point in others)
+            said += f" Not followed: {where}."
+        return said
+
+
+def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSettings) -> Iterator[Locus]:
+    """Follow folds, period doublings and grazes of the branches over a second parameter; yield a locus as it grows.
+
+    Parameters
+    ----------
+    result : FollowedLoci
+        With the branches; the loci are put there.
+    first, second : FollowSettings
+        Ranges of both parameters.
+
+    Raises
+    ------
+    UsageError
+        The second parameter is no number of the scene.
+    """
+    scene, keys = result.followed.scene, (result.followed.parameter, result.second)
+    value = float(scene.value(result.second))
+    follower = LocusFollower(
+        lambda *both: impacting_body(scene.at(dict(zip(keys, both, strict=True)))), first, second
+    )
+    for number, branch in enumerate(result.followed.branches, start=1):
+        for point in branch.points:
+            if point.kind not in FOLLOWED_KINDS or _is_on(result.loci, point, value, first, second):
+                continue
+            origin = f"branch {number}, {branch.full_name}, at {point.at.value:.8g}"
+            ways = Locus(point.kind, origin=origin), Locus(point.kind, origin=origin)
+            try:
+                for way, sign in zip(ways, (-1.0, 1.0), strict=True):
+                    for _ in follower.walk(way, point.at, (point.at.value, value), sign):
+                        yield way
+            finally:
+                if ways[0].points:
+                    result.loci.append(joined_loci(*ways))
+
+
+def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:
+    """Refuse a second parameter over which nothing can be followed.
+
+    Raises
+    ------
+    UsageError
+    """
+    if result.followed.parameter == result.second:
+        raise UsageError(
+            f"--second: expected another number of the scene than {result.second}, got the same."
+        )
+    value = float(result.followed.scene.value(result.second))
+    if not second.lowest <= value <= second.highest:
+        raise UsageError(
+            f"--second-from, --second-to: expected a range around {result.second} = {value:g} of the scene, "
+            f"got {second.lowest:g} to {second.highest:g}."
+        )
+
+
+def _is_on(
+    loci: list[Locus], point: SpecialPoint, value: float, first: FollowSettings, second: FollowSettings
+) -> bool:
+    """Say whether a locus that is known goes through a point."""
+    for locus in loci:
+        if locus.kind == point.kind and locus.points[0].orbit.name == point.at.orbit.name:
+            rows = np.array([each.values for each in locus.points])
+            apart = (rows - (point.at.value, value)) / (first.span, second.span)
+            if _off_path(apart, np.diff(apart, axis=0)) < SAME_ORBIT:
+                return True
+    return False
+
+
+def follow_branches(
+    followed: Followed,
+    start: float,
+    stop: float,
+    *,
+    impacts: int | None = None,
+    periods: int = 1,
+    seed: Seed | None = None,
+    doublings: int = 1,
+    longest: float = 0.01,
+    looking: Callable[[float], None] = lambda value: None,
+) -> Followings:
+    """Follow orbits P(p,q), and those that leave them at period doublings; yield each orbit with its branch.
+
+    Parameters
+    ----------
+    followed : Followed
+        Scene and parameter; the branches are put there, also those that are not followed to their end.
+    start, stop : float
+        Range of the parameter.
+    impacts, periods : int, optional
+        p and q of the first orbits: P(1,q), or as many impacts as the seed has.
+    seed : sequence of (phase, stop), optional
+        Impacts near to those of one orbit of the scene as it is, phases ascending within `periods`: that orbit alone is
+        followed.
+    doublings : int
+        How often branches of twice the period are followed on.
+    longest : float
+        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
+    looking : callable
+        Hears of each value at which orbits of several impacts are looked for.
+
+    Raises
+    ------
+    UsageError
+        The scene has no such orbits, or the parameter is no number of it.
+    OrbitError
+        There is no orbit to begin with.
+    """
+    scene, parameter = followed.scene, followed.parameter
+    _refuse(start, stop, impacts, periods, doublings, longest)
+    body_at = _bodies(scene, parameter, 0.5 * (start + stop))
+    settings = FollowSettings(min(start, stop), max(start, stop), longest)
+    follower = Follower(body_at, settings)
+    begun = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
+    for value, orbit in begun:
+        if not _is_known(followed.branches, orbit, value, settings):
+            yield from _both_ways(follower, orbit, value, followed)
+    if not followed.branches:
+        raise OrbitError(
+            message(
+                f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of "
+                f"{parameter} from {settings.lowest:g} to {settings.highest:g}, got none. ",
+                _other_orbits(scene, parameter, settings, (impacts or 1, periods)),
+            )
+        )
+    yield from _doubled(follower, followed, doublings)
+
+
+def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought: tuple[int, int]) -> str:
+    """Return what to do where there is no orbit of some impacts and periods: what runs in the range end on says it."""
+    ends = _counted(orbit for _, orbit in _ends_of_runs(scene, parameter, settings))
+    ends.pop(sought, None)
+    if not ends:
+        return "Try another range, or other impacts and periods: no run at these values ends on an orbit."
+    (impacts, periods), count = ends.most_common(1)[0]
+    runs = f": runs at {count} of these values end on P({impacts},{periods})."
+    return message("Try ", _asking(impacts, periods), runs)
+
+
+def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[str]:
+    """Return a line for each kind of orbit that runs in a range end on and no branch holds, the commonest first.
+
+    Parameters
+    ----------
+    followed : Followed
+        Branches that begin at orbits of one impact.
+    start, stop : float
+        Range of the parameter.
+    """
+    settings = FollowSettings(min(start, stop), max(start, stop))
+    ends = _ends_of_runs(followed.scene, followed.parameter, settings)
+    missed = _counted(
+        orbit for value, orbit in ends if not _is_known(followed.branches, orbit, value, settings)
+    )
+    return [
+        message(
+            f"Runs at {count} of {SEEDS} values of the range end on P({impacts},{periods}), which is not followed "
+            "here: ",
+            *(_asking(impacts, periods), "."),
+        )
+        for (impacts, periods), count in missed.most_common()
+    ]
+
+
+def _ends_of_runs(
+    scene: Scene, parameter: str, settings: FollowSettings
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    """Yield the orbits that runs end on, with their values of the parameter."""
+    for value in seed_values(settings):
+        orbit = _orbit_of_run_at(scene, parameter, value)
+        if orbit is not None:
+            yield value, orbit
+
+
+def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
+    """Return how many orbits of each number of impacts and periods there are."""
+    return Counter((orbit.phases.size, orbit.periods) for orbit in orbits)
+
+
+def _asking(impacts: int, periods: int) -> Message:
+    """Return what asks for orbits of some impacts and periods."""
+    return message(Argument("impacts", impacts), Either(", ", " "), Argument("periods", periods))
+
+
+def _orbit_of_run_at(scene: Scene, parameter: str, value: float) -> PeriodicOrbit | None:
+    """Return the orbit that a run ends on at a value of the parameter; None where the scene has no run there."""
+    try:
+        return orbit_of_run(scene.with_values({parameter: value}))
+    except SceneError:
+        return None
+
+
+def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed) -> Followings:
+    """Follow an orbit both ways; what is there when it is interrupted is kept."""
+    origin = f"{orbit.full_name} at {value:g}"
+    ways = Branch(origin), Branch(origin)
+    try:
+        yield from follower.both_ways(*ways, orbit, value)
+    finally:
+        backward, forward = ways
+        if backward.orbits:
+            result.branches.append(joined(backward, forward) if forward.orbits else backward)
+
+
+def _doubled(follower: Follower, result: Followed, doublings: int) -> Followings:
+    begin = 0
+    for _ in range(doublings):
+        parents, begin = result.branches[begin:], len(result.branches)
+        for parent in parents:
+            for point in parent.points:
+                if point.kind != "period doubling" or _leads_back(
+                    result.branches, point.at, follower.settings
+                ):
+                    continue
+                child = Branch(f"{parent.full_name} at its period doubling {point.at.value:.11g}")
+                result.branches.append(child)
+                try:
+                    for each in follower.leave(child, point):
+                        yield child, each
+                finally:
+                    if not child.orbits:
+                        result.branches.pop()
+
+
+def _leads_back(branches: list[Branch], doubling: BranchOrbit, settings: FollowSettings) -> bool:
+    """Say whether a branch of twice the period has been followed to this doubling, from its other end."""
+    twice = 2 * doubling.orbit.periods
+    near = SAME_ORBIT * settings.span
+    return any(
+        branch.orbits
+        and branch.orbits[-1].orbit.periods == twice
+        and abs(branch.orbits[-1].value - doubling.value) < 0.01 * near
+        for branch in branches
+    )
+
+
+def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], ImpactingBody]:
+    kept: dict[float, ImpactingBody] = {}
+
+    def body_at(value: float) -> ImpactingBody:
+        value = float(value)
+        if value not in kept:
+            if len(kept) > 8:
+                kept.clear()
+            kept[value] = impacting_body(scene.at({parameter: value}))
+        return kept[value]
+
+    body_at(value)  # a key that is none is refused before anything is followed
+    return body_at
+
+
+def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:
+    """Say whether an orbit is on a branch, counted from any of its impacts and periods."""
+    whole = 2.0 * np.pi * orbit.periods
+    for branch in branches:
+        alike = branch.orbits[0].orbit
+        if alike.periods != orbit.periods or alike.phases.size != orbit.phases.size:
+            continue
+        off = ((branch.values - value) / settings.span)[:, None]
+        rows = np.array([each.orbit.phases for each in branch.orbits])
+        steps = np.diff(np.hstack([rows, off]), axis=0)
+        for first in range(orbit.phases.size):
+            if (np.roll(orbit.contacts, -first) != alike.contacts).any():
+                continue
+            apart = rows - np.append(orbit.phases[first:], orbit.phases[:first] + whole)
+            apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
+            if _off_path(np.hstack([apart, off]), steps) < SAME_ORBIT:
+                return True
+    return False
+
+
+def _off_path(apart: NDArray[np.float64], steps: NDArray[np.float64]) -> float:
+    """Return how far something is off a path.
+
+    Parameters
+    ----------
+    apart : ndarray, shape (n, d)
+        What parts it from the points of the path.
+    steps : ndarray, shape (n - 1, d)
+        From each point to the next.
+    """
+    squares = np.maximum((steps**2).sum(axis=1), np.finfo(np.float64).tiny)
+    shares = np.clip(-(apart[:-1] * steps).sum(axis=1) / squares, 0.0, 1.0)
+    nearest = np.vstack([apart[-1:], apart[:-1] + shares[:, None] * steps])
+    return float(np.sqrt((nearest**2).sum(axis=1)).min())
+
+
+def _refuse(
+    start: float, stop: float, impacts: int | None, periods: int, doublings: int, longest: float
+) -> None:
+    if not (np.isfinite(start) and np.isfinite(stop) and start != stop):
+        raise UsageError(f"--from, --to: expected two different numbers, got {start:g} and {stop:g}.")
+    if not (impacts is None or 1 <= impacts <= MOST_IMPACTS):
+        raise UsageError(f"--impacts: expected 1 to {MOST_IMPACTS}, got {impacts}.")
+    if not periods >= 1:
+        raise UsageError(f"--periods: expected 1 or more, got {periods}.")
+    if not doublings >= 0:
+        raise UsageError(f"--doublings: expected 0 or more, got {doublings}.")
+    if not 1e-4 <= longest <= 0.2:
+        raise UsageError(f"--step: expected 1e-4 to 0.2, got {longest:g}.")
