@@ -72,6 +72,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.orbits import find_orbits as find_orbits
     from vibroimpact.orbits import follow as follow
     from vibroimpact.orbits import maps as maps
+    from vibroimpact.orbits import transients as transients
     from vibroimpact.orchestrator.orbits.energies import energies as energies
     from vibroimpact.orchestrator.orbits.lyapunov import lyapunov as lyapunov
     from vibroimpact.orchestrator.orbits.resonances import resonances as resonances
@@ -119,7 +120,7 @@ _NAMES = {
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
-    "orbits": ("basins", "control", "find_orbits", "follow", "maps"),
+    "orbits": ("basins", "control", "find_orbits", "follow", "maps", "transients"),
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),
     "orchestrator.orbits.resonances": ("resonances",),

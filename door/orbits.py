@@ -17,6 +17,7 @@ from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, contro
 from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
 from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.orbits.maps import MapOfScene, settings_of
+from vibroimpact.orchestrator.orbits.transients import Transients
 from vibroimpact.returned import of_study, runs_of_study
 
 
@@ -270,3 +271,56 @@ def control(
     """
     settings = ControlSettings(law, step, tolerance, limit, noise, seed, periods, stay)
     return of_study(Controlled(control_plan(given_scene(scene), start, stop, settings)))
+
+
+def transients(
+    scene: SceneLike,
+    path: PathLike | None = None,
+    *,
+    starts: int = 8,
+    spread: float = 1.0,
+    tolerance: float = 1e-6,
+    periods: int = 3000,
+) -> xr.Dataset:
+    """Find how many periods a scene needs to forget its start.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        An oscillator, a chain or a beam on restitution stops; its sweep is left out. Without a harmonic force the
+        period is that of its first mode.
+    path : path, optional
+        The dataset to write as well (.nc).
+    starts : int
+        Starts beside that of the scene, drawn evenly, the same each time.
+    spread : float
+        Their largest distance in each displacement and velocity, over the size of the scene's motion.
+    tolerance : float
+        Distance over that size below which a start is forgotten.
+    periods : int
+        Most periods that are followed.
+
+    Returns
+    -------
+    xarray.Dataset
+        `distance` of each `start` from the scene's own motion after each `period`; `forgotten_after` (infinite where it
+        never stays below the tolerance), `contraction` a period, `motion` and `end`: what became of it. The attribute
+        `linear_contraction` is the factor of the body without impacts.
+
+    Raises
+    ------
+    UsageError
+        The scene is none whose orbits are followed, or a number makes no sense.
+
+    Examples
+    --------
+    >>> body = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
+    >>> stop, force = {"position": 1.0, "restitution": 0.7}, {"amplitude": 0.5, "angular_frequency": 1.0}
+    >>> record = {"transient_periods": 0, "recorded_periods": 1}
+    >>> found = transients({"body": body, "forcing": force, "stop": [stop], "record": record}, starts=2)
+    >>> set(found.end.values), found.attrs["motion"]
+    ({'forgotten'}, 'P(1,1)')
+    """
+    chosen = given_scene(scene)
+    written = given_result(path, [scene, chosen])
+    return of_study(Transients(chosen, starts, spread, tolerance, periods), written)

@@ -124,6 +124,9 @@ def kinds() -> dict[str, Picture]:
             "kept",
             "vibroimpact control examples/bifurcation.toml --from 1 --to 0.7 --step 1e-3 -o kept.nc",
         ),
+        "transients": _of(
+            "transients", "transients", "vibroimpact transients examples/basins.toml -o transients.nc"
+        ),
         "hard-cases": _of("hard-cases", "cases", "vibroimpact hard-cases -o cases.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

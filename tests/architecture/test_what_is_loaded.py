@@ -111,6 +111,7 @@ OTHERS: Rows = {
     "energies swept.nc": (ASKED, 0),
     "resonances swept.nc": (ASKED, 2),
     "basins scene.toml --points 5": (ASKED, 0),
+    "transients scene.toml --starts 1": (ASKED, 0),
     # xarray asks which scheduler of Dask there is when it writes
     "maps --kind square-root --points 20 --from 0.1 --to 0.2 -o map.nc": (f"{ASKED} distributed", 0),
     "plot swept.nc -o swept.png": ("dask matplotlib", 0),

@@ -38,6 +38,7 @@ CASES = {
     "orbit": ("orbits", 1),
     "resonances": ("resonances", 6),
     "sensitivity": ("sensitivity", 1),
+    "transients": ("transients", 3),
 }
 """Of each study: a kind of dataset that it makes, and the rows after which it ends."""
 

@@ -86,6 +86,7 @@ KINDS = {
     "map of square roots": "maps --kind square-root --from 0.1 --to 0.2 --points 10",
     "basins": "basins basins.toml --points 6",
     "control": "control forced.toml --from 0.9 --to 0.899 --step 0.001",
+    "transients": "transients forced.toml --starts 2",
     "Lyapunov exponents": "lyapunov forced.toml --set record.recorded_periods=300",
     "energies of one orbit": "energies chain.toml --set record.transient_periods=200 "
     "--set body.dampings=[0.03,0.01,0.02]",

@@ -18,7 +18,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.figures.families import FAMILIES, Family, register
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.hard_cases import measuring
-from vibroimpact.orchestrator.orbits import basins, control, energies, lyapunov, maps, resonances
+from vibroimpact.orchestrator.orbits import basins, control, energies, lyapunov, maps, resonances, transients
 from vibroimpact.orchestrator.study import effects
 from vibroimpact.orchestrator.study.accuracy import results as accuracy
 
@@ -33,7 +33,15 @@ BOTH = OVER | {"stop[1].restitution": [0.7, 0.8]}
 NO_SCENE = {"square-root"}
 TABLES = (
     *(measuring.TABLE, basins.TABLE, control.TABLE, energies.TABLE, lyapunov.TABLE, resonances.TABLE),
-    *(maps.STATES, maps.IMPACTS, maps.NORDMARK, maps.SQUARE_ROOT, effects.TABLE, accuracy.TABLE),
+    *(
+        maps.STATES,
+        maps.IMPACTS,
+        maps.NORDMARK,
+        maps.SQUARE_ROOT,
+        effects.TABLE,
+        accuracy.TABLE,
+        transients.TABLE,
+    ),
 )
 
 
@@ -90,6 +98,10 @@ def test_basins_are_drawn_and_bear_their_kind(scene: vi.Scene, tmp_path: Path) -
 @pytest.mark.skipif(importlib.util.find_spec("pythonfmu") is None, reason="the controller is in Python")
 def test_a_kept_orbit_is_drawn(scene: vi.Scene) -> None:
     drawn(vi.control(scene, 1.0, 0.97, step=1e-2))
+
+
+def test_transients_are_drawn(scene: vi.Scene) -> None:
+    drawn(vi.transients(scene, starts=2))
 
 
 def test_hard_cases_are_drawn() -> None:
