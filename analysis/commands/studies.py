@@ -53,8 +53,10 @@ def conduct(options: Studied) -> None:
         with _naming(study, read):
             failure = _followed(study)
             study.print_results()
-        _write(study, options)
-        _draw(study, options)
+        if options.output is not None:
+            _write(study, options, options.output)
+        if options.figure is not None:
+            _draw(study, options.figure)
         study.conclude(options)
         if failure is not None:
             raise failure
@@ -109,21 +111,20 @@ def _followed(study: Study[Any]) -> Exception | None:
     return None
 
 
-def _write(study: Study[Any], options: Studied) -> None:
-    found = study.written if options.output is not None else None
-    if found is None or options.output is None:
+def _write(study: Study[Any], options: Studied, output: Path) -> None:
+    found = study.written
+    if found is None:
         return
     ended = {INCOMPLETE: study.incomplete} if study.incomplete else {}
     found = found.assign_attrs({**study.marks(options), **ended})
-    with writing(options.output):
-        write = write_results if "results_kind" in found.attrs else write_dataset
-        write(found, options.output)
-    say(f"Dataset written to {options.output}.")
+    with writing(output):
+        (write_results if "results_kind" in found.attrs else write_dataset)(found, output)
+    say(f"Dataset written to {output}.")
 
 
-def _draw(study: Study[Any], options: Studied) -> None:
-    data = study.drawn if options.figure is not None else None
-    if data is None or options.figure is None:
+def _draw(study: Study[Any], figure: Path) -> None:
+    data = study.drawn
+    if data is None:
         return
     from vibroimpact.analysis import figures  # half a second, which a table needs not
 
@@ -132,8 +133,8 @@ def _draw(study: Study[Any], options: Studied) -> None:
     except DatasetError as problem:
         if not study.incomplete:
             raise
-        say(f"{options.figure} is not written: {problem}", err=True)  # half a study may have nothing to draw
+        say(f"{figure} is not written: {problem}", err=True)  # half a study may have nothing to draw
         return
-    with writing(options.figure):
-        figures.save(drawn, options.figure)
-    say(f"Figure written to {options.figure}.")
+    with writing(figure):
+        figures.save(drawn, figure)
+    say(f"Figure written to {figure}.")

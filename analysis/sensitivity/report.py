@@ -163,35 +163,7 @@ def sensitivity_report(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> xr.Dataset:
-    """Estimate how much of the variance of each quantity each drawn key of a campaign accounts for.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As `open_dataset` gives it, of a sweep with `sample = { design = "saltelli", ... }`. Keys that span the drawn
-        ones stay dimensions: indices along a frequency, say.
-    of : sequence of str
-        Quantities, see `quantities_of`; none: all that there are.
-    level, resamples, seed
-        Of the bootstrap intervals, see `sobol_indices`.
-
-    Returns
-    -------
-    xarray.Dataset
-        `first_order`, `total_order` and their intervals on `quantity`, `parameter` and the other keys of the sweep;
-        `blocks`: how many they are estimated from. NaN where a quantity is constant; the attribute `remarks` says so.
-
-    Raises
-    ------
-    DatasetError
-        The dataset has no Saltelli design, or nothing that varies over it.
-    UsageError
-        There is no such quantity; or the level, the number of resamples or the seed makes no sense.
-
-    Examples
-    --------
-    >>> sensitivity_report(open_dataset("campaign")).total_order      # doctest: +SKIP
-    """
+    """Return the Sobol indices of an opened campaign: see `vibroimpact.sensitivity`."""
     return whole(SensitivityOfCampaign(dataset, of, level, resamples, seed)).dataset
 
 

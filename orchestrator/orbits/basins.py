@@ -314,17 +314,10 @@ class BasinsOfScene(Study[Basins]):
             for now in find_basins(self.known, flow, block=BLOCK):
                 names = ", ".join(now.names) or "none yet"
                 self.status(f"{100.0 * now.decided:.1f} % of {now.possible} starts; {names}")
-                yield now
+                if now.attractors:
+                    yield now
         finally:
             flow.close()
-
-    def take(self, row: Basins) -> None:
-        """Keep nothing: what is known has grown."""
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no attractor is known."""
-        return not self.known.attractors
 
     def made(self) -> xr.Dataset:
         """Return what is known of the plane."""

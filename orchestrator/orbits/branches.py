@@ -220,23 +220,9 @@ def follow_branches(
 ) -> Followings:
     """Follow orbits P(p,q), and those that leave them at period doublings; yield each orbit with its branch.
 
-    Parameters
-    ----------
-    followed : Followed
-        Scene and parameter; the branches are put there, also those that are not followed to their end.
-    start, stop : float
-        Range of the parameter.
-    impacts, periods : int, optional
-        p and q of the first orbits: P(1,q), or as many impacts as the seed has.
-    seed : sequence of (phase, stop), optional
-        Impacts near to those of one orbit of the scene as it is, phases ascending within `periods`: that orbit alone is
-        followed.
-    doublings : int
-        How often branches of twice the period are followed on.
-    longest : float
-        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
-    looking : callable
-        Hears of each value at which orbits of several impacts are looked for.
+    Branches are put into `followed`, also those that are not followed to their end. `longest` is the largest step, the
+    range of the parameter counted 1, a radian of all phases 1; for the others see `vibroimpact.follow`. `looking` hears
+    of each value at which orbits of several impacts are looked for.
 
     Raises
     ------

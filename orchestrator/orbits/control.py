@@ -119,19 +119,11 @@ class Controlled(Study[int]):
             importer = Importer(components, connections, macro_step=self.plan.orbits[0].body.period)
             try:
                 for impacts in _run(importer, self):
-                    many = counted(impacts, "impact")
-                    self.status(f"Angular frequency {self.reached:.6g}, {many}")
-                    yield impacts
+                    self.status(f"Angular frequency {self.reached:.6g}, {counted(impacts, 'impact')}")
+                    if impacts:
+                        yield impacts
             finally:
                 importer.free()
-
-    def take(self, row: int) -> None:
-        """Keep nothing: the list of impacts has grown."""
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether there was no impact."""
-        return not self.impacts
 
     def made(self) -> xr.Dataset:
         """Return impacts and orbits."""

@@ -12,7 +12,6 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import UnitSystem
 from vibroimpact.analysis.orbits.body import Floats
@@ -25,7 +24,6 @@ from vibroimpact.analysis.orbits.energies import (
 )
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
-from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
@@ -35,6 +33,7 @@ from vibroimpact.orchestrator.orbits.runs import (
     OnSweep,
     RunsStudy,
     place_of,
+    results_of,
     runs_of,
     scene_of,
     units_of,
@@ -209,10 +208,7 @@ def energies(
     --------
     >>> energies("run.nc").residual_energy      # doctest: +SKIP
     """
-    if not isinstance(dataset, xr.Dataset):
-        with open_dataset(dataset) as opened:
-            return energies(opened, run, progress=progress)
-    return whole(EnergiesOfRuns(dataset, run, progress)).dataset
+    return results_of(EnergiesOfRuns, dataset, run, progress)
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:

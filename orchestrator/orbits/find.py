@@ -43,7 +43,7 @@ REPEATS = 1e-4
 
 @dataclass(eq=False)
 class OrbitsOfScene(Study[PeriodicOrbit]):
-    """Periodic orbits of a scene; a row is an orbit. See `find_orbits` for the parameters."""
+    """Periodic orbits of a scene; a row is an orbit. See `vibroimpact.find_orbits`."""
 
     name = "orbit"
     nothing = "an orbit"
@@ -147,27 +147,7 @@ def find_orbits(
     seed: Seed | None = None,
     penetrating: bool = False,
 ) -> FoundOrbits:
-    """Return periodic orbits of a scene, stable and unstable.
-
-    Parameters
-    ----------
-    scene : Scene
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
-    impacts, periods : int, optional
-        p and q. Without them, all orbits P(1,1) and the orbit that a long run of the scene ends on.
-    seed : sequence of (phase, stop), optional
-        Impacts near to those of one orbit, phases ascending within `periods`; that orbit alone is looked for, physical
-        or not.
-    penetrating : bool
-        Whether orbits that pass through a stop between impacts are returned as well.
-
-    Raises
-    ------
-    UsageError
-        The scene has no such orbits to be looked for.
-    OrbitError
-        There is no orbit near to the seed.
-    """
+    """Return periodic orbits of a scene, stable and unstable: see `vibroimpact.find_orbits`."""
     return whole(OrbitsOfScene(scene, impacts, periods, seed, penetrating)).orbits
 
 

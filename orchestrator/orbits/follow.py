@@ -144,7 +144,9 @@ class Following(Study[str]):
         if self.seed is None and self.impacts is None and not self.incomplete:
             for line in orbits_not_followed(self.followed, self.start, self.stop):
                 say(typed(line))
-        self._print_loci()
+        if self.second is not None:
+            self._print_loci()
+            say(self.loci.left_out)
 
     def conclude(self, options: Follow) -> None:
         """Say what the dataset holds where two numbers were varied."""
@@ -178,8 +180,11 @@ class Following(Study[str]):
 
     def _print_unexplained(self) -> None:
         for number, branch in enumerate(self.followed.branches, start=1):
-            points = [point for point in branch.points if point.kind == STABILITY_CHANGE]
-            values = [f"{point.at.value:.{UNEXPLAINED_DIGITS}g}" for point in points]
+            values = [
+                f"{point.at.value:.{UNEXPLAINED_DIGITS}g}"
+                for point in branch.points
+                if point.kind == STABILITY_CHANGE
+            ]
             if values:
                 say(
                     f"{number}  {branch.full_name}: stability changes at {', '.join(values)}, and no cause was found. "
@@ -199,8 +204,6 @@ class Following(Study[str]):
                 say(
                     f"   codimension 2, {locus.kind} and {kind}: {point.values[0]:.11g}, {point.values[1]:.11g}"
                 )
-        if self.second:
-            say(self.loci.left_out)
 
 
 def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:

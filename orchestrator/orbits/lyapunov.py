@@ -10,15 +10,21 @@ from os import PathLike
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.orbits.exponents import ExponentError, Exponents, exponents_of
-from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
-from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, OnSweep, RunsStudy, scene_of, units_of
+from vibroimpact.orchestrator.orbits.runs import (
+    Bodies,
+    ImpactsOf,
+    OnSweep,
+    RunsStudy,
+    results_of,
+    scene_of,
+    units_of,
+)
 from vibroimpact.orchestrator.run.provenance import runs_attributes
 
 TABLE = ResultTable(
@@ -103,10 +109,7 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     --------
     >>> lyapunov("run.nc").lyapunov_exponent      # doctest: +SKIP
     """
-    if not isinstance(dataset, xr.Dataset):
-        with open_dataset(dataset) as opened:
-            return lyapunov(opened)
-    return whole(ExponentsOfRuns(dataset)).dataset
+    return results_of(ExponentsOfRuns, dataset)
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> Exponents | str:

@@ -10,19 +10,17 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.energies import OrbitEnergies
 from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
-from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.energies import EnergiesOfRuns
-from vibroimpact.orchestrator.orbits.runs import RunsStudy, scene_of, units_of
+from vibroimpact.orchestrator.orbits.runs import RunsStudy, results_of, scene_of, units_of
 from vibroimpact.orchestrator.run.provenance import runs_attributes
 from vibroimpact.orchestrator.scene import Scene
 
@@ -154,10 +152,7 @@ def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     --------
     >>> resonances("campaign").peak_frequency     # doctest: +SKIP
     """
-    if not isinstance(dataset, xr.Dataset):
-        with open_dataset(dataset) as opened:
-            return resonances(opened)
-    return whole(PeaksOfSweep(dataset)).dataset
+    return results_of(PeaksOfSweep, dataset)
 
 
 def _peaks(curves: Mapping[str, Floats], frequency: Floats) -> list[_Found]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar
 
@@ -17,7 +18,7 @@ from vibroimpact.analysis.dataset.schema import Outcome, UnitSystem
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.recorded import Impacts
-from vibroimpact.analysis.study import Study
+from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.dataset import coordinate_names
@@ -95,6 +96,14 @@ def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
             run_scene(scene, file, progress=progress)
         with open_dataset(file) as dataset:
             yield dataset
+
+
+def results_of(
+    kind: type[RunsStudy[Any]], dataset: xr.Dataset | str | PathLike[str], *more: Any
+) -> xr.Dataset:
+    """Return the results of a study of runs, given as a dataset or as its file or folder."""
+    with nullcontext(dataset) if isinstance(dataset, xr.Dataset) else open_dataset(dataset) as runs:
+        return whole(kind(runs, *more)).dataset
 
 
 def scene_of(dataset: xr.Dataset, who: str) -> Scene:

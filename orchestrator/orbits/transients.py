@@ -170,10 +170,8 @@ class Transients(Study[Floats]):
         """Return the distances, and what became of each start."""
         distances = np.array(self.found).T
         after = [_after(row, self.tolerance) for row in distances]
-        told = self._told
-        if self.incomplete:
-            ends = [FORGOTTEN if math.isfinite(each) else SLOW for each in after]
-            told = Told(["unknown"] * (self.starts + 1), ends)
+        ends = [FORGOTTEN if math.isfinite(each) else SLOW for each in after]
+        told = Told(["unknown"] * (self.starts + 1), ends) if self.incomplete else self._told
         values = {
             "period": np.arange(distances.shape[1]),
             "distance": distances,
