@@ -107,7 +107,7 @@ class Transients(Study[Floats]):
         _refuse(self)
         self.scene = self.scene.unswept()
         self.is_forced = self.scene.period is not None
-        if not self.is_forced:
+        if not self.is_forced and self.scene.general is None and self.scene.replay is None:
             self.scene = _with_the_first_mode(self.scene)
         self.body = impacting_body(self.scene)
 

@@ -121,6 +121,11 @@ def test_numbers_that_make_no_sense_are_refused(options: dict[str, Any], message
     assert str(refused.value) == message
 
 
+def test_components_are_refused() -> None:
+    with pytest.raises(UsageError, match="body: expected an oscillator, a chain or a beam whose orbits"):
+        vi.transients(EXAMPLES / "newtons_cradle.toml")
+
+
 def test_a_stop_that_yields_is_refused() -> None:
     yielding = scene(1.0).with_values({"stop": [{"position": 1.0, "law": "hertz", "stiffness": 1e6}]})
     with pytest.raises(UsageError, match=r'stop\[1\].law: expected "restitution"'):
