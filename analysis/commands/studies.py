@@ -59,7 +59,8 @@ def conduct(options: Studied) -> None:
             _draw(study, options.figure)
         study.conclude(options)
         if failure is not None:
-            raise failure
+            with _naming(study, read):
+                raise failure
         if study.incomplete:
             say(study.interruption, err=True)
             raise typer.Exit(130)
