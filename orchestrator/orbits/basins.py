@@ -265,14 +265,7 @@ def points_of(text: str) -> tuple[int, int]:
 
 @dataclass(eq=False)
 class BasinsOfScene(Study[Basins]):
-    """Where the starts of a plane end; a row is what is known after a block of starts.
-
-    Parameters
-    ----------
-    scene : Scene
-        An oscillator, a chain or a beam on restitution stops; its sweep is left out.
-    plane : Plane
-    """
+    """Where the starts of a plane end: see `vibroimpact.basins`. A row is what is known after a block of starts."""
 
     name = "basins"
     nothing = "an attractor"

@@ -116,16 +116,7 @@ _MOST_SHOWN = 4
 
 @dataclass(eq=False)
 class EnergiesOfRuns(RunsStudy[tuple[Found, float]]):
-    """Energies of the modes of the runs of a dataset; a row is those of a run, and how far it is from its orbit.
-
-    Parameters
-    ----------
-    runs : xarray.Dataset
-    run : int, optional
-        `run_index` of one run alone.
-    progress : Progress, optional
-        Told how far it is, where there are many runs.
-    """
+    """Energies of the modes: see `energies`. A row is those of a run, and how far it is from its orbit."""
 
     name = "energies"
     nothing = "a run with energies"

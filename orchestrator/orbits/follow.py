@@ -39,19 +39,7 @@ EXACT_DIGITS, UNEXPLAINED_DIGITS = 11, 6
 
 @dataclass(eq=False)
 class Following(Study[str]):
-    """Orbits of a scene over one of its numbers; a row is an orbit that was added to a branch or to a curve.
-
-    Parameters
-    ----------
-    scene : Scene
-        An oscillator, a chain or a beam on restitution stops; its sweep is left out.
-    parameter, start, stop
-        Key of a number of the scene, and its range.
-    impacts, periods, seed, doublings, step
-        See `branches.follow_branches`.
-    second, second_range
-        Key of another number, and its range: bifurcations are followed over both.
-    """
+    """Orbits of a scene over one of its numbers: see `vibroimpact.follow`. A row names what grew."""
 
     name = "follow"
     nothing = "an orbit"

@@ -176,14 +176,7 @@ def settings_of(kind: str, **options: Any) -> MapSettings:
 
 @dataclass(eq=False)
 class MapOfScene(Study[str]):
-    """A map of a scene as points to be drawn; a row is the name of a part of it, or of a part of a diagram.
-
-    Parameters
-    ----------
-    scene : Scene, optional
-        `square-root`, and `nordmark` with alpha and gamma, need none.
-    settings : MapSettings
-    """
+    """A map as points to be drawn: see `vibroimpact.maps`. A row is the name of a part of it that is found."""
 
     name = "maps"
     nothing = "a map"

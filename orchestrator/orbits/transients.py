@@ -76,21 +76,7 @@ class Told(NamedTuple):
 
 @dataclass(eq=False)
 class Transients(Study[Floats]):
-    """Distances of starts from a scene's own motion; a row is those of one period.
-
-    Parameters
-    ----------
-    scene : Scene
-        An oscillator, a chain or a beam on restitution stops; its sweep is left out.
-    starts : int
-        Starts beside that of the scene, drawn evenly, the same each time.
-    spread : float
-        Their largest distance in each displacement and velocity, over the size of the motion.
-    tolerance : float
-        Distance over that size.
-    periods : int
-        Most periods.
-    """
+    """Distances of starts from a scene's own motion: see `vibroimpact.transients`. A row is those of one period."""
 
     name = "transients"
     nothing = "a period"

@@ -89,19 +89,7 @@ MOST_FIRST_PERIODS = 4096
 
 @dataclass(eq=False)
 class AccuracyOfScene(Study[Measured]):
-    """What accuracy costs in time: error and cost of each way of simulating a scene; a row is a way.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its number of modes is known. Its sweep is left out: each swept number has the value of its own table.
-    tolerance : float, optional
-        Relative error that is asked for.
-    quantity : str
-        One of `errors.QUANTITIES`, or `all`, the worst of those.
-    budget : float
-        Processor time that the study takes, of all its processes, within a factor of 1.5, s.
-    """
+    """Error and cost of each way of simulating a scene: see `vibroimpact.accuracy`. A row is a way."""
 
     name = "accuracy"
     nothing = "a way that had run"
