@@ -86,15 +86,7 @@ class DraftTables:
 
 
 class Draft(DraftTables):
-    """A scene of the short form on its way.
-
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document; a swept key need not be written.
-    axes : tuple of SweepAxis
-        Its sweep.
-    """
+    """A scene of one body on its way; a key that its axes sweep need not be written."""
 
     def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
         super().__init__(with_swept_keys(document, axes))

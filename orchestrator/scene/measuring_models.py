@@ -44,7 +44,7 @@ def channels_in(names: Iterable[str]) -> tuple[str, ...]:
     >>> channels_in(["velocity", "drive", "sensor.velocity"])
     ('drive', 'sensor.velocity')
     """
-    return tuple(name for name in names if name in CHANNELS)
+    return tuple(filter(CHANNELS.__contains__, names))
 
 
 FALLING_FORCE = "force that falls with distance"

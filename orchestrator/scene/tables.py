@@ -19,22 +19,7 @@ _COMMON_TABLES = ("record", "sweep", "execution")
 
 
 def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
-    """Validate the tables of a document.
-
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document, whatever is in it.
-    folder : Path
-        The folder of the scene file, from which the paths in it count.
-
-    Returns
-    -------
-    fields : dict
-        The fields of the `Scene`; they are to be used only where there is no problem.
-    problems : list of Problem
-        All of them, in the order of the tables.
-    """
+    """Return the parts of a scene, to be used only where there is no problem, and all that is wrong with its tables."""
     general = [name for name in _GENERAL_TABLES if name in document]
     short = [name for name in _SHORT_TABLES if name in document]
     if general and short:
@@ -43,7 +28,7 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
     unknown = list(_table_problems(document, ("scene", *own, *_COMMON_TABLES)))
     if general:
         # What reads model descriptions takes time to load, and the short form does not need it.
-        from vibroimpact.orchestrator.scene.general.tables import read_general
+        from vibroimpact.orchestrator.scene.component_tables import read_general
 
         fields, problems = read_general(document, folder)
     else:
@@ -70,9 +55,9 @@ def _read_short(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Probl
     assert draft.record is not None
     return {
         **dict(draft.header),
-        "body": draft.body,
+        "bodies": (draft.body,),
+        "contacts": draft.stops,
         "forcing": draft.forcing,
-        "stops": draft.stops,
         "sensor": draft.sensor,
         **{name: getattr(draft, name) for name in CHAIN_TABLES},
         "record": _applicable(draft.record),

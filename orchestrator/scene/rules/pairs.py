@@ -10,13 +10,13 @@ from functools import partial
 from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.units import parse_unit
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
-from vibroimpact.orchestrator.scene.general.components import DraftComponent
-from vibroimpact.orchestrator.scene.general.contact_rules import variable_problems
-from vibroimpact.orchestrator.scene.general.models import BodyPair, BodyPointTable
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
-from vibroimpact.orchestrator.scene.general.scene import component_variable
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.component_models import BodyPair, BodyPointTable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable
+from vibroimpact.orchestrator.scene.components import DraftComponent
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.components import GeneralDraft
+from vibroimpact.orchestrator.scene.rules.contacts import variable_problems
 
 #: The law of a port that watches no stop of its own.
 PAIR_LAW = "pair"

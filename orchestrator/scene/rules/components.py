@@ -18,15 +18,12 @@ from vibroimpact.fmus.units import (
     parse_unit,
     product_agrees,
 )
-from vibroimpact.orchestrator.scene.draft import DraftTables
-from vibroimpact.orchestrator.scene.fields import rule_of
-from vibroimpact.orchestrator.scene.general.component_facts import (
+from vibroimpact.orchestrator.scene.component_facts import (
     NUMERIC_KINDS,
     ComponentFacts,
     VariableFacts,
 )
-from vibroimpact.orchestrator.scene.general.components import components_of
-from vibroimpact.orchestrator.scene.general.models import (
+from vibroimpact.orchestrator.scene.component_models import (
     PAIR_MODELS,
     BodyPair,
     ConnectionTable,
@@ -35,12 +32,15 @@ from vibroimpact.orchestrator.scene.general.models import (
     PairTable,
     StopContactTable,
 )
-from vibroimpact.orchestrator.scene.general.scene import (
+from vibroimpact.orchestrator.scene.component_numbers import (
     STEP_KEY,
     component_variable,
     contact_key,
     gain_place,
 )
+from vibroimpact.orchestrator.scene.components import components_of
+from vibroimpact.orchestrator.scene.draft import DraftTables
+from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, nearest, quoted
@@ -55,15 +55,7 @@ SOURCES = ("output", "local", "parameter", "calculatedParameter")
 
 
 class GeneralDraft(DraftTables):
-    """A general scene on its way.
-
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document.
-    folder : Path
-        The folder of the scene file, from which FMU paths count.
-    """
+    """A general scene on its way."""
 
     def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
         super().__init__(document)

@@ -1,18 +1,17 @@
-"""What a general scene asks of the importer, after validation."""
+"""Keys of scenes of components, and the numbers that they name."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
     ConnectionSpec,
-    EventSpec,
-    Exchange,
     PairSpec,
     StopContactSpec,
 )
@@ -70,64 +69,31 @@ def contact_key(key: str) -> tuple[int, str] | None:
     return (int(match[1]) - 1, match[2]) if match else None
 
 
+def is_step(components: Sequence[ComponentSpec], key: str) -> bool:
+    """Whether a key is the step of the exchange, and no number of a component of that name."""
+    return key == STEP_KEY and all(component.name != "execution" for component in components)
+
+
 @dataclass(frozen=True, slots=True)
-class GeneralScene:
-    """Components of any FMU files, how they are connected, and what of them is recorded.
+class ComponentNumbers:
+    """The numbers of a scene of components by their keys.
 
     Attributes
     ----------
     components : tuple of ComponentSpec
-        In the order of the file. Start values have the type of their variable: float, int (also for
-        enumerations), bool or str. A swept start value that the file leaves out has its first swept value.
+        Start values have the type of their variable: float, int (also for enumerations), bool or str. A swept start
+        value that the file leaves out has its first swept value.
     connections : tuple of ConnectionSpec
-        In the order of the file.
-    events : tuple of EventSpec
-        Crossings to be found by step revision.
-    variables : tuple of str
-        Recorded variables, `component.variable`.
-    rate : float or None
-        Samples of them per s; None when nothing is sampled.
-    macro_step : float
-        Time between two exchanges, s; the whole run when nothing is exchanged.
-    exchange : {"jacobi", "gauss_seidel", "iterated"}
-        In which order values are exchanged.
-    guard : bool
-        Whether points run in a child process that may crash or hang.
-    units : mapping of str to str
-        Unit of each recorded variable and swept key as the description writes it; `1` where it has none.
-    start_units : mapping of str to str
-        The same of each start value, gain and number of a contact that the scene gives.
+        Their gains.
     contacts : tuple of StopContactSpec and PairSpec
-        In the order of the file.
-    doubts : tuple of str
-        What the descriptions of its FMUs leave open, and what is assumed: `FILE: ...`.
-    remarks : mapping of str to int
-        By the file of an FMU, how much else is odd in its description and changes no number.
+    macro_step : float
+        Time between two exchanges, s.
     """
 
     components: tuple[ComponentSpec, ...]
     connections: tuple[ConnectionSpec, ...]
-    events: tuple[EventSpec, ...]
-    variables: tuple[str, ...]
-    rate: float | None
-    macro_step: float
-    exchange: Exchange
-    guard: bool
-    units: Mapping[str, str]
-    start_units: Mapping[str, str] = field(default_factory=dict)
-    contacts: tuple[StopContactSpec | PairSpec, ...] = ()
-    doubts: tuple[str, ...] = ()
-    remarks: Mapping[str, int] = field(default_factory=dict)
-
-    @property
-    def stop_contacts(self) -> tuple[StopContactSpec, ...]:
-        """Bodies of any tool that meet stops."""
-        return tuple(contact for contact in self.contacts if isinstance(contact, StopContactSpec))
-
-    @property
-    def pairs(self) -> tuple[PairSpec, ...]:
-        """Bodies that hit each other."""
-        return tuple(contact for contact in self.contacts if isinstance(contact, PairSpec))
+    contacts: tuple[StopContactSpec | PairSpec, ...]
+    macro_step: float = math.inf
 
     def value(self, key: str) -> float:
         """Return the number that `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].NAME` has.
@@ -137,7 +103,7 @@ class GeneralScene:
         UsageError
             When the scene gives no such number.
         """
-        if self.is_step(key):
+        if is_step(self.components, key):
             return self.macro_step
         place = gain_place(key)
         if place is not None:
@@ -160,8 +126,8 @@ class GeneralScene:
             for name, value in contact.numbers.items():
                 yield f"contact[{number}].{name}", value
 
-    def at(self, values: Mapping[str, float]) -> GeneralScene:
-        """Return this scene with other start values, gains and numbers of contacts, without validating it again.
+    def at(self, values: Mapping[str, float]) -> ComponentNumbers:
+        """Return these parts with other start values, gains and numbers of contacts, without validating it again.
 
         Raises
         ------
@@ -171,7 +137,7 @@ class GeneralScene:
         components, connections = list(self.components), list(self.connections)
         contacts, macro_step = list(self.contacts), self.macro_step
         for key, value in values.items():
-            if self.is_step(key):
+            if is_step(self.components, key):
                 macro_step = float(value)
                 continue
             place = gain_place(key)
@@ -189,17 +155,7 @@ class GeneralScene:
             before = components[index].parameters
             typed = float(value) if isinstance(before[variable], float) else int(value)
             components[index] = replace(components[index], parameters={**before, variable: typed})
-        return replace(
-            self,
-            components=tuple(components),
-            connections=tuple(connections),
-            contacts=tuple(contacts),
-            macro_step=macro_step,
-        )
-
-    def is_step(self, key: str) -> bool:
-        """Whether a key is the step of the exchange, and no number of a component of that name."""
-        return key == STEP_KEY and all(component.name != "execution" for component in self.components)
+        return ComponentNumbers(tuple(components), tuple(connections), tuple(contacts), macro_step)
 
     def _connection(self, place: int, key: str) -> ConnectionSpec:
         if place < len(self.connections):

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from vibroimpact.orchestrator.fmi.capabilities import INTERNAL_STEP, VARIABLE_STEPS
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
-from vibroimpact.orchestrator.scene.general.scene import STEP_KEY, component_variable
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts
+from vibroimpact.orchestrator.scene.component_numbers import STEP_KEY, component_variable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path
+from vibroimpact.orchestrator.scene.rules.components import GeneralDraft
 
 #: Largest distance of a ratio from a whole number, relative, that rounding explains: instants agree to 1e-13.
 WHOLE = 1e-14

@@ -7,11 +7,11 @@ from functools import partial
 
 from vibroimpact.fmus.core.contact_laws import contact_law, rigid_law_numbers
 from vibroimpact.fmus.units import Unit, agree, parse_unit
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, VariableFacts
-from vibroimpact.orchestrator.scene.general.models import StopContactTable
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
-from vibroimpact.orchestrator.scene.general.scene import component_variable, mass_place
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, VariableFacts
+from vibroimpact.orchestrator.scene.component_models import StopContactTable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable, mass_place
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.components import GeneralDraft
 
 #: Variables of a stop that say which law it follows, on which side it is.
 LAW, SIDE = "law", "side"

@@ -8,29 +8,21 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+from vibroimpact.orchestrator.scene.component_facts import Misfit, swept_value
+from vibroimpact.orchestrator.scene.component_numbers import component_variable, contact_key, gain_place
+from vibroimpact.orchestrator.scene.components import settable_names, start_problems
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, numeric_keys, rule_of
-from vibroimpact.orchestrator.scene.general.component_facts import Misfit, swept_value
-from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem
-from vibroimpact.orchestrator.scene.general.scene import component_variable, contact_key, gain_place
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.components import GeneralDraft, reference_problem
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.sweep_table import read_sweep
 
 
 def read_general_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
-    """Read the sweep of a general scene.
-
-    Returns
-    -------
-    axes : tuple of SweepAxis
-        The axes without a problem, in the order of the file.
-    problems : list of Problem
-        Everything that is wrong with the others, and between them.
-    """
+    """Return the sound axes of a scene of components, and what is wrong with the others and between them."""
     axes, problems = read_sweep(
         draft.document,
         lambda key, entry: _key_problems(key, entry, draft),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,22 +13,22 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.scene.general.component_facts import Misfit, StartValue, swept_value
-from vibroimpact.orchestrator.scene.general.components import DraftComponent
-from vibroimpact.orchestrator.scene.general.contact_rules import contact_problems, velocity_input
-from vibroimpact.orchestrator.scene.general.models import (
+from vibroimpact.orchestrator.scene.component_facts import Misfit, StartValue, swept_value
+from vibroimpact.orchestrator.scene.component_models import (
     ConnectionTable,
     EventTable,
     GeneralRecord,
     StopContactTable,
 )
-from vibroimpact.orchestrator.scene.general.pair_rules import PortPlan, plan_ports
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable, mass_place
-from vibroimpact.orchestrator.scene.general.step_rules import step_problems
-from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep
-from vibroimpact.orchestrator.scene.models import Execution, Record
+from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, component_variable, mass_place
+from vibroimpact.orchestrator.scene.component_sweep import read_general_sweep
+from vibroimpact.orchestrator.scene.components import DraftComponent
+from vibroimpact.orchestrator.scene.models import Execution, Record, TimeSeries
 from vibroimpact.orchestrator.scene.problems import Problem
+from vibroimpact.orchestrator.scene.rules.components import GeneralDraft, general_problems
+from vibroimpact.orchestrator.scene.rules.contacts import contact_problems, velocity_input
+from vibroimpact.orchestrator.scene.rules.pairs import PortPlan, plan_ports
+from vibroimpact.orchestrator.scene.rules.steps import step_problems
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 
@@ -51,24 +50,27 @@ def read_general(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, A
     assert draft.header is not None
     assert draft.record is not None
     assert draft.execution is not None
-    execution = _execution(draft, draft.execution)
     return {
         **dict(draft.header),
+        **_parts(draft, plan, axes),
         "record": _record(draft.record),
         "sweep": axes,
-        "execution": execution,
-        "general": _general(draft, plan, execution, axes),
+        "execution": _execution(draft, draft.execution),
     }, []
 
 
 def _record(record: GeneralRecord) -> Record:
-    """Return the durations as every scene has them; there are no periods."""
+    """Return what is recorded as every scene has it; there are no periods."""
+    series = None
+    if record.variables:  # names of components and variables are longer than those of one body
+        series = TimeSeries.model_construct(rate=record.rate, variables=record.variables)
     return Record(
         transient_time=record.transient_time,
         recorded_time=record.recorded_time,
         impacts=record.events,
         extrema=False,
         strobe=False,
+        time_series=series,
     )
 
 
@@ -80,33 +82,24 @@ def _execution(draft: GeneralDraft, execution: Execution) -> Execution:
     return execution.model_copy(update={"guard": foreign})
 
 
-def _general(
-    draft: GeneralDraft, plan: PortPlan, execution: Execution, axes: tuple[SweepAxis, ...]
-) -> GeneralScene:
-    record = draft.record
-    assert record is not None
+def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
+    """Return the parts that a file with components names, with the units and the doubts that their FMUs declare."""
+    assert draft.record is not None
     facts = [component.facts for component in draft.components.values() if component.facts]
-    general = GeneralScene(
-        components=tuple(_component(component, plan, axes) for component in draft.components.values()),
-        connections=tuple(_connection(table) for table in draft.connections if table),
-        events=tuple(_event(table) for table in draft.events if table),
-        variables=record.variables,
-        rate=record.rate,
-        macro_step=execution.macro_step
-        or _first_step(draft, axes)
-        or record.transient_time + record.recorded_time,
-        exchange=execution.exchange,
-        guard=execution.guard,
-        units={key: draft.unit(key) for key in (*record.variables, *(axis.key for axis in axes))},
-        contacts=tuple(_contact(draft, plan, place, axes) for place in range(len(draft.contacts))),
-        doubts=tuple(dict.fromkeys(f"{one.file}: {doubt}" for one in facts for doubt in one.doubts)),
-        remarks={one.file: one.remarks for one in facts if one.remarks},
-    )
-    return replace(general, start_units={key: draft.unit(key) for key, _ in general.numbers()})
-
-
-def _first_step(draft: GeneralDraft, axes: tuple[SweepAxis, ...]) -> float | None:
-    return next((axis.values[0] for axis in axes if draft.names_step(axis.key)), None)
+    components = tuple(_component(component, plan, axes) for component in draft.components.values())
+    connections = tuple(_connection(table) for table in draft.connections if table)
+    contacts = tuple(_contact(draft, plan, place, axes) for place in range(len(draft.contacts)))
+    numbers = ComponentNumbers(components, connections, contacts).numbers()
+    keys = (*draft.record.variables, *(axis.key for axis in axes), *(key for key, _ in numbers))
+    return {
+        "bodies": components,
+        "contacts": contacts,
+        "connections": connections,
+        "events": tuple(_event(table) for table in draft.events if table),
+        "declared_units": {key: draft.unit(key) for key in keys},
+        "doubts": tuple(dict.fromkeys(f"{one.file}: {doubt}" for one in facts for doubt in one.doubts)),
+        "remarks": {one.file: one.remarks for one in facts if one.remarks},
+    }
 
 
 def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> ComponentSpec:

@@ -15,7 +15,7 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
-from vibroimpact.orchestrator.scene.general.component_facts import (
+from vibroimpact.orchestrator.scene.component_facts import (
     ComponentFacts,
     Misfit,
     StartValue,
@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
     component_facts,
     typed_value,
 )
-from vibroimpact.orchestrator.scene.general.models import ComponentTable
+from vibroimpact.orchestrator.scene.component_models import ComponentTable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted, read_table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
@@ -58,17 +58,7 @@ class DraftComponent:
 
 
 def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
-    """Return the components of a document by name; what is wrong with them joins the problems.
-
-    Parameters
-    ----------
-    raw : object
-        What the document has under `component`.
-    folder : Path
-        The folder of the scene file, from which FMU paths count.
-    problems : list of Problem
-        Grows.
-    """
+    """Return the components of a document by name; what is wrong with them joins the problems."""
     if not isinstance(raw, dict) or not raw:
         got = "nothing" if raw in (None, {}) else quoted(raw)
         hint = 'Write [component.ball] and below it fmu = "ball.fmu".'
