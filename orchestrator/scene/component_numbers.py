@@ -45,18 +45,6 @@ def gain_place(key: str) -> int | None:
     return int(match[1]) - 1 if match else None
 
 
-def mass_place(key: str) -> int | None:
-    """Return the 0-based place of the contact whose mass a key names; None when it names none.
-
-    Examples
-    --------
-    >>> mass_place("contact[2].mass"), mass_place("ball.mass")
-    (1, None)
-    """
-    found = contact_key(key)
-    return found[0] if found is not None and found[1] == "mass" else None
-
-
 def contact_key(key: str) -> tuple[int, str] | None:
     """Return the 0-based place of the contact of which a key names a number, and that name; None when it names none.
 

@@ -10,12 +10,12 @@ from pydantic.fields import FieldInfo
 
 from vibroimpact.orchestrator.scene.component_facts import Misfit, swept_value
 from vibroimpact.orchestrator.scene.component_numbers import component_variable, contact_key, gain_place
-from vibroimpact.orchestrator.scene.components import settable_names, start_problems
+from vibroimpact.orchestrator.scene.components import GeneralDraft, settable_names, start_problems
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
-from vibroimpact.orchestrator.scene.rules.components import GeneralDraft, reference_problem
+from vibroimpact.orchestrator.scene.rules.components import reference_problem
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.sweep_table import read_sweep
@@ -90,7 +90,7 @@ def _contact_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Pro
         yield Problem(where, "a number of a contact", quoted(key), hint)
         return
     place, name = named
-    table = draft.contact(place)
+    table = draft.contacts[place]
     if table is not None and name not in (known := list(numeric_keys(type(table)))):
         near = partial(nearest, name, known, f"contact[{place + 1}].")
         yield Problem(where, "a number of this contact", quoted(key), near)
@@ -134,7 +134,7 @@ def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
 
 def _contact_values(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
     named = contact_key(axis.key)
-    table = None if named is None else draft.contact(named[0])
+    table = None if named is None else draft.contacts[named[0]]
     if named is None or table is None or named[1] not in type(table).model_fields:
         return
     yield from _number_problems(axis, field_of(type(table), named[1]))

@@ -15,17 +15,18 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.scene.component_facts import Misfit, StartValue, swept_value
 from vibroimpact.orchestrator.scene.component_models import (
+    BodyPair,
     ConnectionTable,
     EventTable,
     GeneralRecord,
     StopContactTable,
 )
-from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, component_variable, mass_place
+from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, component_variable, contact_key
 from vibroimpact.orchestrator.scene.component_sweep import read_general_sweep
-from vibroimpact.orchestrator.scene.components import DraftComponent
+from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDraft
 from vibroimpact.orchestrator.scene.models import Execution, Record, TimeSeries
 from vibroimpact.orchestrator.scene.problems import Problem
-from vibroimpact.orchestrator.scene.rules.components import GeneralDraft, general_problems
+from vibroimpact.orchestrator.scene.rules.components import general_problems
 from vibroimpact.orchestrator.scene.rules.contacts import contact_problems, velocity_input
 from vibroimpact.orchestrator.scene.rules.pairs import PortPlan, plan_ports
 from vibroimpact.orchestrator.scene.rules.steps import step_problems
@@ -88,7 +89,7 @@ def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> 
     facts = [component.facts for component in draft.components.values() if component.facts]
     components = tuple(_component(component, plan, axes) for component in draft.components.values())
     connections = tuple(_connection(table) for table in draft.connections if table)
-    contacts = tuple(_contact(draft, plan, place, axes) for place in range(len(draft.contacts)))
+    contacts = tuple(_contact(draft, plan, *each, axes) for each in enumerate(draft.contacts))
     numbers = ComponentNumbers(components, connections, contacts).numbers()
     keys = (*draft.record.variables, *(axis.key for axis in axes), *(key for key, _ in numbers))
     return {
@@ -133,13 +134,16 @@ def _event(table: EventTable) -> EventSpec:
 
 
 def _contact(
-    draft: GeneralDraft, plan: PortPlan, place: int, axes: tuple[SweepAxis, ...]
+    draft: GeneralDraft,
+    plan: PortPlan,
+    place: int,
+    table: StopContactTable | BodyPair | None,
+    axes: tuple[SweepAxis, ...],
 ) -> StopContactSpec | PairSpec:
-    table = draft.contact(place)
     assert table is not None
     if not isinstance(table, StopContactTable):
         return plan.pair(place, table)
-    swept = next((axis.values[0] for axis in axes if mass_place(axis.key) == place), None)
+    swept = next((axis.values[0] for axis in axes if contact_key(axis.key) == (place, "mass")), None)
     return StopContactSpec(
         body=table.body,
         displacement=table.displacement,

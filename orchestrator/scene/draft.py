@@ -74,11 +74,12 @@ class DraftTables:
         if isinstance(kind, str) and kind in models:
             there = len(self.problems)
             table = self.read(models[kind], raw, path)
-            belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
-            self.problems[there:] = [
-                replace(problem, hint=belongs.get(problem.key, problem.hint))
-                for problem in self.problems[there:]
-            ]
+            if table is None:
+                belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
+                self.problems[there:] = [
+                    replace(problem, hint=belongs.get(problem.key, problem.hint))
+                    for problem in self.problems[there:]
+                ]
             return table
         model = models[default]
         self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))

@@ -261,7 +261,10 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     SceneError
         With all problems of the text, each on one line.
     """
-    written, changed = changed_document(parse_scene_toml(text, source), changes)
+    written = parse_scene_toml(text, source)
+    changed: tuple[str, ...] = ()
+    if changes:
+        written, changed = changed_document(written, changes)
     document = with_resting_start(written) if for_orbits else written
     fields, problems = read_tables(document, Path(source).parent)
     if problems:

@@ -46,7 +46,7 @@ def _mixed_problem(general: list[str], short: list[str]) -> Problem:
 
 
 def _read_short(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    axes, sweep_problems = read_short_sweep(document)
+    axes, sweep_problems = read_short_sweep(document) if "sweep" in document else ((), [])
     draft = Draft(document, axes)
     problems = draft.problems + sweep_problems + rule_problems(draft)
     if problems:

@@ -11,11 +11,10 @@ from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.units import parse_unit
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
-from vibroimpact.orchestrator.scene.component_models import BodyPair, BodyPointTable
+from vibroimpact.orchestrator.scene.component_models import BodyPair, BodyPointTable, PairTable
 from vibroimpact.orchestrator.scene.component_numbers import component_variable
-from vibroimpact.orchestrator.scene.components import DraftComponent
+from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDraft
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
-from vibroimpact.orchestrator.scene.rules.components import GeneralDraft
 from vibroimpact.orchestrator.scene.rules.contacts import variable_problems
 
 #: The law of a port that watches no stop of its own.
@@ -55,8 +54,8 @@ def plan_ports(draft: GeneralDraft) -> PortPlan:
     """Find a contact port for each point that another body may hit."""
     plan = PortPlan()
     taken: dict[tuple[str, str], str] = {}
-    for place, table in enumerate(draft.pairs):
-        if table is None:
+    for place, table in enumerate(draft.contacts):
+        if not isinstance(table, PairTable):
             continue
         names = [component_variable(point)[0] for point in table.between]
         where = key_path(("contact", place, "between"))
@@ -226,7 +225,7 @@ def _free_port(draft: GeneralDraft, component: DraftComponent, rest: str, plan: 
         if all(parameters.get(name) == value for name, value in wanted.items()):
             return port
     swept = draft.document.get("sweep")
-    named = [point for table in draft.pairs if table for point in table.between]
+    named = [point for table in draft.contacts if isinstance(table, PairTable) for point in table.between]
     used = {
         *parameters,
         *plan.parameters.get(component.name, {}),
