@@ -62,21 +62,12 @@ def is_step(components: Sequence[ComponentSpec], key: str) -> bool:
     return key == STEP_KEY and all(component.name != "execution" for component in components)
 
 
+Part = ComponentSpec | ConnectionSpec | StopContactSpec | PairSpec
+
+
 @dataclass(frozen=True, slots=True)
 class ComponentNumbers:
-    """The numbers of a scene of components by their keys.
-
-    Attributes
-    ----------
-    components : tuple of ComponentSpec
-        Start values have the type of their variable: float, int (also for enumerations), bool or str. A swept start
-        value that the file leaves out has its first swept value.
-    connections : tuple of ConnectionSpec
-        Their gains.
-    contacts : tuple of StopContactSpec and PairSpec
-    macro_step : float
-        Time between two exchanges, s.
-    """
+    """The numbers of a scene of components by their keys: start values, gains, those of contacts, the step (s)."""
 
     components: tuple[ComponentSpec, ...]
     connections: tuple[ConnectionSpec, ...]
@@ -93,78 +84,81 @@ class ComponentNumbers:
         """
         if is_step(self.components, key):
             return self.macro_step
-        place = gain_place(key)
-        if place is not None:
-            return self._connection(place, key).gain
-        named = contact_key(key)
-        if named is not None:
-            return self._contact_number(*named, key)
-        component, variable = self._start_value(key)
-        return float(self.components[component].parameters[variable])
+        owner, name = _taken_apart(key)
+        part = self._parts().get(owner)
+        numbers = {} if part is None else _numbers_of(part)
+        if name not in numbers:
+            raise UsageError(f"{key}: expected {self._known(key)}")
+        return float(numbers[name])
 
     def numbers(self) -> Iterator[tuple[str, float]]:
         """Yield each start value that is a number, each gain and each number of a contact, with its key."""
-        for component in self.components:
-            for variable, start in component.parameters.items():
-                if isinstance(start, int | float) and not isinstance(start, bool):
-                    yield f"{component.name}.{variable}", float(start)
-        for number, connection in enumerate(self.connections, start=1):
-            yield f"connection[{number}].gain", connection.gain
-        for number, contact in enumerate(self.contacts, start=1):
-            for name, value in contact.numbers.items():
-                yield f"contact[{number}].{name}", value
+        for owner, part in self._parts().items():
+            for name, number in _numbers_of(part).items():
+                yield f"{owner}.{name}", float(number)
 
     def at(self, values: Mapping[str, float]) -> ComponentNumbers:
-        """Return these parts with other start values, gains and numbers of contacts, without validating it again.
+        """Return other start values, gains and numbers of contacts, without validating them again.
 
         Raises
         ------
         UsageError
             For a key that is neither swept nor given in the scene.
         """
-        components, connections = list(self.components), list(self.connections)
-        contacts, macro_step = list(self.contacts), self.macro_step
+        parts, macro_step = self._parts(), self.macro_step
         for key, value in values.items():
+            self.value(key)  # refuses a key of no number
             if is_step(self.components, key):
                 macro_step = float(value)
-                continue
-            place = gain_place(key)
-            if place is not None:
-                self._connection(place, key)
-                connections[place] = replace(connections[place], gain=float(value))
-                continue
-            named = contact_key(key)
-            if named is not None:
-                self._contact_number(*named, key)
-                number: dict[str, Any] = {named[1]: float(value)}
-                contacts[named[0]] = replace(contacts[named[0]], **number)
-                continue
-            index, variable = self._start_value(key)
-            before = components[index].parameters
-            typed = float(value) if isinstance(before[variable], float) else int(value)
-            components[index] = replace(components[index], parameters={**before, variable: typed})
-        return ComponentNumbers(tuple(components), tuple(connections), tuple(contacts), macro_step)
+            else:
+                owner, name = _taken_apart(key)
+                parts[owner] = _with_number(parts[owner], name, value)
+        changed: Any = tuple(parts.values())
+        first, last = len(self.components), len(parts) - len(self.contacts)
+        return ComponentNumbers(changed[:first], changed[first:last], changed[last:], macro_step)
 
-    def _connection(self, place: int, key: str) -> ConnectionSpec:
-        if place < len(self.connections):
-            return self.connections[place]
-        raise UsageError(f"{key}: expected one of {len(self.connections)} connections, got an absent one.")
+    def _parts(self) -> dict[str, Part]:
+        """Return what has numbers, as keys name it."""
+        return {
+            **{component.name: component for component in self.components},
+            **{f"connection[{number}]": each for number, each in enumerate(self.connections, start=1)},
+            **{f"contact[{number}]": each for number, each in enumerate(self.contacts, start=1)},
+        }
 
-    def _contact_number(self, place: int, name: str, key: str) -> float:
-        numbers = self.contacts[place].numbers if place < len(self.contacts) else {}
-        if name in numbers:
-            return numbers[name]
-        raise UsageError(f"{key}: expected a number of a contact that this scene gives or sweeps, got none.")
-
-    def _start_value(self, key: str) -> tuple[int, str]:
-        """Return the place of the component and the variable that a key names."""
-        name, _, variable = key.partition(".")
-        for place, component in enumerate(self.components):
-            if component.name == name and isinstance(component.parameters.get(variable), int | float):
-                if isinstance(component.parameters[variable], bool):
-                    break
-                return place, variable
-        raise UsageError(
-            f"{key}: expected a number that this scene gives or sweeps, got none. "
-            "Write it in the parameters of its component."
+    def _known(self, key: str) -> str:
+        """Return what a key that names no number should have been."""
+        if gain_place(key) is not None:
+            return f"one of {len(self.connections)} connections, got an absent one."
+        if contact_key(key) is not None:
+            return "a number of a contact that this scene gives or sweeps, got none."
+        return (
+            "a number that this scene gives or sweeps, got none. Write it in the parameters of its component."
         )
+
+
+def _taken_apart(key: str) -> tuple[str, str]:
+    """Return the part of a scene that a key names, and the name of its number."""
+    if gain_place(key) is None and contact_key(key) is None:
+        return component_variable(key)
+    owner, _, name = key.rpartition(".")
+    return owner, name
+
+
+def _numbers_of(part: Part) -> Mapping[str, float]:
+    if isinstance(part, ConnectionSpec):
+        return {"gain": part.gain}
+    if not isinstance(part, ComponentSpec):
+        return part.numbers
+    return {
+        name: start
+        for name, start in part.parameters.items()
+        if isinstance(start, int | float) and not isinstance(start, bool)
+    }
+
+
+def _with_number(part: Part, name: str, value: float) -> Part:
+    if not isinstance(part, ComponentSpec):
+        number: dict[str, Any] = {name: float(value)}
+        return replace(part, **number)
+    typed = float(value) if isinstance(part.parameters[name], float) else int(value)
+    return replace(part, parameters={**part.parameters, name: typed})

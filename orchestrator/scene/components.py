@@ -49,23 +49,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class DraftComponent:
-    """A component on its way; `facts` is None where its FMU cannot be read, and then nothing is said of it.
-
-    Attributes
-    ----------
-    name : str
-        Its name in the scene.
-    fmu : Path or None
-        Its FMU file.
-    shipped : bool
-        Whether it is one of this package.
-    facts : ComponentFacts or None
-        What its description says.
-    parameters : mapping of str to StartValue
-        The valid ones of its start values.
-    tolerance : float or None
-        Relative tolerance that its FMU is set up with; None: the FMU's own.
-    """
+    """A component on its way, with its valid start values; of one whose FMU cannot be read there are no facts."""
 
     name: str
     fmu: Path | None = None
@@ -256,6 +240,12 @@ def start_problems(variable: VariableFacts, where: str) -> Iterator[Problem]:
         yield Problem(where, "a variable with a start value", _described(variable), hint)
     elif variable.kind in ("binary", "clock") or not variable.scalar:
         yield Problem(where, "a number, true or false, or text", _described(variable))
+
+
+def not_restorable(facts: ComponentFacts, where: str, hint: str) -> Problem:
+    """Return the problem of an FMU that has to go back to a state, and cannot."""
+    got = f"{facts.file}, which does not have canGetAndSetFMUState"
+    return Problem(where, "an FMU whose state can be kept and restored", got, hint)
 
 
 def settable_names(facts: ComponentFacts) -> list[str]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
@@ -84,6 +84,14 @@ class DraftTables:
         model = models[default]
         self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
         return None
+
+
+class Reading(NamedTuple):
+    """What is read of a document in one of its forms: its draft, what is wrong between its tables, its parts else."""
+
+    draft: DraftTables
+    problems: list[Problem]
+    parts: Callable[[], dict[str, Any]]
 
 
 class Draft(DraftTables):

@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.scene.component_models import (
 from vibroimpact.orchestrator.scene.component_numbers import (
     component_variable,
 )
-from vibroimpact.orchestrator.scene.components import GeneralDraft
+from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sample_problems
@@ -184,8 +184,7 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
             yield Problem(where, "a continuous real number", got, "A crossing needs values on both sides.")
         if not facts.restorable:
             hint = "A crossing is found by going back to the state before the step."
-            got = f"{facts.file}, which does not have canGetAndSetFMUState"
-            yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+            yield not_restorable(facts, where, hint)
         force = _contact_answer(draft, component_variable(event.watch)[0])
         if facts.event_mode and force is not None:
             hint = (

@@ -10,7 +10,7 @@ from vibroimpact.fmus.units import Unit, agree, parse_unit
 from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, VariableFacts
 from vibroimpact.orchestrator.scene.component_models import StopContactTable
 from vibroimpact.orchestrator.scene.component_numbers import component_variable, contact_key
-from vibroimpact.orchestrator.scene.components import GeneralDraft
+from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 
 #: Variables of a stop that say which law it follows, on which side it is.
@@ -114,8 +114,7 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
             "A stop is asked for its force along the way of the body. Use an ImpactStop, or connect this one by "
             "[[connection]] with a small macro_step."
         )
-        got = f"{facts.file}, which does not have canGetAndSetFMUState"
-        yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+        yield not_restorable(facts, where, hint)
     body = _facts(draft, table.body)
     if body is not None and not body.restorable and _is_rigid(draft, table, facts):
         hint = (

@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.component_models import BodyPair, BodyPointTable, PairTable
 from vibroimpact.orchestrator.scene.component_numbers import component_variable
-from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDraft
+from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.contacts import variable_problems
 
@@ -30,14 +30,7 @@ _LAST, _TIP = 0, 1.0
 class PortPlan:
     """Which contact port, or point, each end of each pair takes, and what its component must be given for that.
 
-    Attributes
-    ----------
-    ends : mapping of (place, end) to (component, port) or BodyPoint
-        By the 0-based place of the `[[contact]]` and of the point in its `between`.
-    parameters : mapping of str to mapping
-        Start values by component.
-    problems : list of Problem
-        Everything that is wrong.
+    Ends go by the 0-based place of the `[[contact]]` and of the point in its `between`, start values by component.
     """
 
     ends: dict[tuple[int, int], tuple[str, str] | BodyPoint] = field(default_factory=dict)
@@ -109,14 +102,8 @@ def _foreign_point_problems(
         compared = None if draft.is_nondimensional else unit
         yield from variable_problems(where, name, facts, getattr(point, key), causality, compared)
     if not facts.restorable:
-        got = f"{facts.file}, which does not have canGetAndSetFMUState"
         hint = "The instant at which two bodies meet is found by going back."
-        yield Problem(
-            key_path(("contact", place, "bodies", name)),
-            "an FMU whose state can be kept and restored",
-            got,
-            hint,
-        )
+        yield not_restorable(facts, key_path(("contact", place, "bodies", name)), hint)
     for number, connection in enumerate(draft.connections, start=1):
         if connection is not None and component_variable(connection.target) == (name, point.force):
             where = key_path(("contact", place, "bodies", name, "force"))

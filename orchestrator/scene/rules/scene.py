@@ -35,9 +35,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _units_agree,
         *BODY_RULES,
         *STOP_RULES,
-        *_measuring_rules(draft),
-        _time_series_has_a_rate,
-        *_replay_rules(draft),
+        *_recording_rules(draft),
         _record_counts_what_there_is,
         _samples_fit,
         *((_adaptive_axes_can_tell_motions,) if draft.axes else ()),
@@ -47,21 +45,17 @@ def rule_problems(draft: Draft) -> list[Problem]:
     return [*problems, *sweep_problems(draft.axes)] if draft.axes else problems
 
 
-def _measuring_rules(draft: Draft) -> tuple[DraftRule, ...]:
-    if not draft.channels and draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES)):
-        return ()
-    # other scenes load none of a chain
-    from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
+def _recording_rules(draft: Draft) -> Iterator[DraftRule]:
+    """Yield the rules of a measuring chain, of a time series and of a replay; scenes without them load none."""
+    if draft.channels or not draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES)):
+        from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
 
-    return MEASURING_RULES
+        yield from MEASURING_RULES
+    yield _time_series_has_a_rate
+    if draft.replay is not None:
+        from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES
 
-
-def _replay_rules(draft: Draft) -> tuple[DraftRule, ...]:
-    if draft.replay is None:
-        return ()
-    from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES
-
-    return REPLAY_RULES
+        yield from REPLAY_RULES
 
 
 def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
