@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
-from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor, channels_in
+from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
 from vibroimpact.orchestrator.scene.models import (
     STOP_MODELS,
     Execution,
@@ -30,6 +30,7 @@ from vibroimpact.orchestrator.scene.problems import (
     read_table,
 )
 from vibroimpact.orchestrator.scene.replay_models import Replay
+from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})

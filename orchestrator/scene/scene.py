@@ -40,8 +40,43 @@ class Scene(ViewedScene, Parts):
 
     Attributes
     ----------
+    source : str
+        Where the scene came from, for messages.
     text : str
         The TOML text, for provenance.
+    title : str
+        What the scene is called; may be empty.
+    units : {"SI", "nondimensional"}
+        The meaning of all numbers.
+    bodies : tuple of OscillatorBody, ChainBody or BeamBody, or of ComponentSpec
+        One body of the package; or the components, of any FMUs, in the order of the file.
+    contacts : tuple of stops, or of StopContactSpec and PairSpec
+        The stops of the body; or which components meet. In the order of the file.
+    connections : tuple of ConnectionSpec
+        Inputs of components that outputs of others feed.
+    events : tuple of EventSpec
+        Crossings in components, to be found by step revision.
+    forcing : Forcing or None
+        What drives the body; None without a `[forcing]` table.
+    sensor : Sensor or None
+        Where a beam is observed, and what a sensor there reads; None without a `[sensor]` table.
+    load_cell, exciter, noise, daq : LoadCell, Exciter, Noise, Daq, or None
+        The measuring chain beside `[sensor]`; None without their tables.
+    replay : Replay or None
+        Recorded channels that drive the body and that its motion is compared with; None without `[replay]`.
+    record : Record
+        What is recorded; periods in a forced scene, times in any other. Of components `impacts` says whether located
+        events are recorded.
+    sweep : tuple of SweepAxis
+        The swept keys in the order of the file; see `vibroimpact.orchestrator.scene.sweep.expand`.
+    execution : Execution
+        How the points run.
+    declared_units : mapping of str to str
+        Unit of each number, recorded variable and swept key of components as it is declared; `1` where it has none.
+    doubts : tuple of str
+        What the descriptions of FMUs leave open, and what is assumed: `FILE: ...`.
+    remarks : mapping of str to int
+        By the file of an FMU, how much else is odd in its description and changes no number.
     found : mapping
         What was found out about the scene before it runs, by attribute of its datasets; `study.preparation`
         does.
