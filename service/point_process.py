@@ -63,10 +63,7 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
     watched = _watched(scene, place)
     with open_scene(watched) as runner:
         record = runner.record_of(place.point.values, place.start if place.first else start)
-    series = watched.record.time_series
-    names = series.variables if series is not None else ()
-    if watched.general is not None:
-        names = tuple(watched.general.variables)
+    names = watched.sampled
     motion = {
         "samples": _samples(record, names),
         "impacts": _columns(record.impacts, IMPACT_COLUMNS),
@@ -136,7 +133,7 @@ def _start_of(results: Path, branch: Branch, run: int) -> State | None:
 def _watched(scene: Scene, place: BranchPoint) -> Scene:
     """Return a scene that records what is shown: its last periods in time, with its impacts."""
     record = scene.record
-    if scene.general is not None or scene.replay is not None:
+    if not scene.is_lone_body:
         return scene
     period = scene.at(place.point.values).period
     if record.recorded_periods:
@@ -145,7 +142,7 @@ def _watched(scene: Scene, place: BranchPoint) -> Scene:
         rate = PER_PERIOD / period
     else:
         rate = (MOST_SAMPLES - 1) / record.recorded_time if record.recorded_time else PER_PERIOD
-    others = record.time_series.variables if record.time_series is not None else ()
+    others = scene.sampled
     series = TimeSeries(rate=rate, variables=tuple(dict.fromkeys((*OBSERVED, *others))))
     return scene.model_copy(
         update={"record": record.model_copy(update={"time_series": series, "impacts": True, "strobe": True})}
@@ -155,7 +152,7 @@ def _watched(scene: Scene, place: BranchPoint) -> Scene:
 def _stops(scene: Scene, names: Sequence[str]) -> dict[str, list[float]]:
     """Return the positions (m) of the stops that limit each sampled displacement, by its name."""
     found: dict[str, list[float]] = {}
-    body = scene.body if scene.general is None else None
+    body = scene.bodies[0]
     points: list[float | None] = [None] * len(scene.stops)
     observed: float | None = None
     if isinstance(body, ChainBody):
@@ -202,7 +199,7 @@ def _units(scene: Scene, names: Sequence[str]) -> dict[str, str]:
     for name in names:
         if name in RULES:
             found[name] = str(attributes_of(name, scene.units)["units"])
-        elif scene.general is None and (unit := known_unit(name.replace(".", "_"))) is not None:
+        elif scene.is_one_body and (unit := known_unit(name.replace(".", "_"))) is not None:
             found[name] = unit_in(scene.units, unit)
     return found
 

@@ -12,9 +12,9 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import components, letters_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.changes import text_with_values
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
-from vibroimpact.orchestrator.scene.text import text_with_values
 from vibroimpact.service.fmus import FmuStore
 from vibroimpact.service.places import Places
 from vibroimpact.service.problems import MOST_PROBLEMS, shortened

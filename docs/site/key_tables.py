@@ -12,9 +12,15 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from vibroimpact.orchestrator.scene import body_models, measuring_models, models, replay_models, sweep_models
+from vibroimpact.orchestrator.scene import (
+    body_models,
+    component_models,
+    measuring_models,
+    models,
+    replay_models,
+    sweep_models,
+)
 from vibroimpact.orchestrator.scene.fields import bounds_of, choices_of, forms_of, rule_of
-from vibroimpact.orchestrator.scene.general import models as general_models
 
 _MARKED = re.compile(
     r"(?P<begin><!-- keys of (?P<model>\w+) -->\n).*?(?P<end><!-- end of keys -->)", re.DOTALL
@@ -33,7 +39,7 @@ def with_key_tables(page: str) -> str:
     """
     tables = {
         name: found
-        for module in (models, body_models, measuring_models, replay_models, sweep_models, general_models)
+        for module in (models, body_models, measuring_models, replay_models, sweep_models, component_models)
         for name, found in vars(module).items()
         if isinstance(found, type) and issubclass(found, BaseModel)
     }

@@ -85,7 +85,7 @@ def plant_scene(settings: RigSettings) -> Scene:
     """Return the scene of a rig as its plant: without its sweep, for as long as it is served."""
     assert settings.rig.scene is not None
     scene = load_scene(settings.beside(settings.rig.scene))
-    if scene.general is not None or scene.replay is not None:
+    if not scene.is_lone_body:
         raise UsageError(
             f"{settings.source}: rig.scene: expected an oscillator or a beam, got a scene of another kind."
         )

@@ -42,7 +42,7 @@ def may_begin_here(scene: Scene, runner: str, points: int) -> bool:
     """
     if runner != DEFAULT_RUNNER:
         return False
-    return points == 1 if scene.is_guarded else scene.general is None
+    return points == 1 if scene.execution.guard else scene.is_one_body
 
 
 @contextmanager

@@ -242,8 +242,7 @@ class GuardedRunner(Runner):
         return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
 
     def _file_of(self, instance: str) -> str:
-        components = self.scene.general.components if self.scene.general is not None else ()
-        return next((str(spec.fmu) for spec in components if spec.name == instance), "")
+        return next((str(spec.fmu) for spec in self.scene.components if spec.name == instance), "")
 
     def close(self) -> None:
         """End the child and remove its notes."""

@@ -46,7 +46,7 @@ def _refuse(scene: Scene) -> None:
     def refused(where: str, expected: str, got: str) -> UsageError:
         return UsageError(f"{scene.source}: {where}: expected {expected}, got {got}.")
 
-    if scene.body_given is None or scene.replay is not None:
+    if not scene.is_lone_body:
         kind = "a replay" if scene.replay is not None else "a scene of components"
         raise refused("body", "an oscillator, a chain or a beam whose orbits are followed", kind)
     if scene.forcing is None or scene.period is None:

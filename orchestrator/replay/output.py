@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.replay.replayer import Motion, Replayer, replay_ta
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.text import text_with_values
+from vibroimpact.orchestrator.scene.changes import text_with_values
 
 _HEAD = "# Fitted by vibroimpact replay to"
 _HEADING = re.compile(rf"\A{_HEAD} .*\n(?:# [^\n]* \+- .*\n)*\n?")

@@ -22,7 +22,7 @@ from vibroimpact.orchestrator.replay.replayer import (
 )
 from vibroimpact.orchestrator.replay.scoring import compare_motion, scores_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.scene.text import text_with_values
+from vibroimpact.orchestrator.scene.changes import text_with_values
 
 
 @dataclass(frozen=True, slots=True)

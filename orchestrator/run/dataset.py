@@ -24,7 +24,7 @@ from vibroimpact.analysis.dataset.schema import RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
-from vibroimpact.orchestrator.run.empty_record import empty_record, records_impacts, sample_variables
+from vibroimpact.orchestrator.run.empty_record import empty_record, records_impacts
 from vibroimpact.orchestrator.run.measuring.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.scene import Scene
@@ -49,22 +49,21 @@ class DatasetForm:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._names = coordinate_names(scene)
-        general = scene.general
         self._said: dict[str, Any] = {
-            "sample_variables": sample_variables(scene),
+            "sample_variables": scene.sampled,
             "units": scene.units,
             "unit_of": _units(scene, self._names),
             "omit": _omitted(scene),
             "each_period": scene.record.each_period,
-            "event_components": [c.name for c in general.components] if general is not None else (),
+            "event_components": [component.name for component in scene.components],
             "connections": _energy_connections(scene),
             "compared": compared_names(scene),
         }
-        stored = dict(zip(sample_variables(scene), stored_samples(scene), strict=True))
+        stored = dict(zip(scene.sampled, stored_samples(scene), strict=True))
         of_channels = channel_attributes(scene).items()
         self._attributes = {stored[name]: own for name, own in of_channels} | _described(scene, self._names)
-        if general is not None and records_impacts(scene):
-            self._attributes["impact_contact"] = _named_contacts([each.name for each in general.contacts])
+        if not scene.is_one_body and records_impacts(scene):
+            self._attributes["impact_contact"] = _named_contacts([each.name for each in scene.meetings])
 
     def dataset(
         self,
@@ -201,13 +200,13 @@ def _taken(scene: Scene) -> frozenset[str]:
 
 def stored_samples(scene: Scene) -> tuple[str, ...]:
     """Return the name that each sampled variable has in the file, in the order of the scene."""
-    return file_names(sample_variables(scene), _taken(scene) | set(coordinate_names(scene).values()))
+    return file_names(scene.sampled, _taken(scene) | set(coordinate_names(scene).values()))
 
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     """Units that the names do not say."""
-    if scene.general is not None:
-        units = {**scene.general.start_units, **scene.general.units}
+    if not scene.is_one_body:
+        units = dict(scene.declared_units)
         stored = {file: units[key] for key, file in names.items() if key in units}
         return units | stored if scene.units == "SI" else stored
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
@@ -233,7 +232,7 @@ def _unit(scene: Scene, key: str) -> str:
 
 def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     """Names of swept keys whose unit cannot be said otherwise."""
-    if scene.general is not None or scene.units != "SI":
+    if not scene.is_one_body or scene.units != "SI":
         return {}
     unsaid = {file: key for key, file in names.items() if cf_unit(scene, key) is None}
     return {file: f"{file.replace('_', ' ')} in {_unit(scene, key)}" for file, key in unsaid.items()}
@@ -261,9 +260,9 @@ def compared_names(scene: Scene) -> tuple[str, ...]:
 
 
 def _energy_connections(scene: Scene) -> tuple[str, ...]:
-    if scene.general is None:
+    if scene.is_one_body:
         return ()
     # only general scenes need FMPy, which takes long to import
     from vibroimpact.orchestrator.importer.energy import force_connections
 
-    return force_connections(scene.general.components, scene.general.connections, scene.general.stop_contacts)
+    return force_connections(scene.components, scene.connections, scene.stop_contacts)

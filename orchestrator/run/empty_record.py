@@ -21,17 +21,9 @@ MOST_CONTACTS = int(np.iinfo(RULES["impact_contact"].dtype).max)
 """Contacts of a scene of components that a table of impacts can number."""
 
 
-def sample_variables(scene: Scene) -> tuple[str, ...]:
-    """Return the names of the variables that the scene samples."""
-    if scene.general is not None:
-        return scene.general.variables if scene.general.rate is not None else ()
-    return scene.record.time_series.variables if scene.record.time_series else ()
-
-
 def records_impacts(scene: Scene) -> bool:
     """Say whether runs of a scene have a table of impacts: of components it is that of their contacts."""
-    contacts = None if scene.general is None else len(scene.general.contacts)
-    return scene.record.impacts and (contacts is None or 0 < contacts <= MOST_CONTACTS)
+    return scene.record.impacts and (scene.is_one_body or 0 < len(scene.contacts) <= MOST_CONTACTS)
 
 
 def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -> RunRecord:
@@ -46,18 +38,17 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
     seconds : float
         Wall time it took, s.
     """
-    record, names = scene.record, sample_variables(scene)
-    general = scene.general is not None
+    record, names = scene.record, scene.sampled
     elements = most_elements(scene)
-    periods = scene.period is not None and (record.extrema or record.strobe) and not general
+    periods = scene.period is not None and (record.extrema or record.strobe)
     return RunRecord(
         outcome=outcome,
         message=message,
         periods=np.empty((0, len(PERIOD_COLUMNS))) if periods else None,
         impacts=np.empty((0, len(IMPACT_COLUMNS))) if records_impacts(scene) else None,
-        sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and not general else None,
+        sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and scene.is_one_body else None,
         samples=np.empty((0, 1 + len(names))) if names else None,
         seconds=seconds,
         final_state=np.full(2 * elements, math.nan) if elements else None,
-        events=np.empty((0, 3)) if record.impacts and general else None,
+        events=np.empty((0, 3)) if record.impacts and not scene.is_one_body else None,
     )

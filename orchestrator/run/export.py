@@ -46,8 +46,7 @@ def export_scene(
     UsageError
         The scene has another kind of body, or the file cannot be written.
     """
-    body = scene.body_given
-    if body is None:
+    if not scene.is_one_body:
         raise UsageError(
             f"{scene.source}: expected the scene of one body, with [body], got components. "
             "Each of them is an FMU already."
@@ -63,7 +62,7 @@ def export_scene(
             "of a body has it, got one that falls with the distance. Leave it out, or connect an Exciter to the FMU."
         )
     return export_fmu(
-        FMU_NAMES[body.kind],
+        FMU_NAMES[scene.body.kind],
         output,
         contacts=len(scene.stops),
         fmi=fmi,

@@ -29,7 +29,7 @@ from vibroimpact.orchestrator.run.record import (
 )
 from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable
 
 NO_ROWS = np.empty((0, 3))
 #: What components that are counted from 0 are counted from 1 with, in rows of events.
@@ -64,14 +64,14 @@ class GeneralRunner(Runner):
         log: LogOf | None = None,
         wrap: WrapOf | None = None,
     ) -> None:
-        if execution not in ("auto", "coupled") or scene.general is None:
+        if execution not in ("auto", "coupled") or scene.is_one_body:
             problem = (
                 f'{scene.source}: execution.how: expected "coupled" for a general scene, got "{execution}".'
             )
             raise SceneError([problem])
         self.execution = "coupled"
         self.instruction_set = platform.machine()
-        self.scene, self._general = scene, scene.general
+        self.scene = scene
         self._log, self._wrap = log, wrap
         self._deadline = Deadline()
         self._build()
@@ -83,19 +83,19 @@ class GeneralRunner(Runner):
     def _impacts(self) -> list[ContactImpacts]:
         """The impacts of each contact, in the order of the scene."""
         stops, pairs = map(iter, self._importer.contacts.impacts)
-        return [next(pairs if isinstance(each, PairSpec) else stops) for each in self._general.contacts]
+        return [next(pairs if isinstance(each, PairSpec) else stops) for each in self.scene.contacts]
 
     def _build(self) -> None:
         """Make the importer with all that watches it."""
-        general = self._general
+        scene = self.scene
         self._importer = Importer(
-            general.components,
-            general.connections,
-            general.events,
-            general.stop_contacts,
-            general.pairs,
-            exchange=general.exchange,
-            macro_step=general.macro_step,
+            scene.components,
+            scene.connections,
+            scene.events,
+            scene.stop_contacts,
+            scene.pairs,
+            exchange=scene.execution.exchange,
+            macro_step=scene.macro_step,
             log=self._log,
             wrap=self._wrap,
         )
@@ -104,14 +104,13 @@ class GeneralRunner(Runner):
         self._importer.late_events = LateEvents(lambda: self._limit - self._seen, self._note_late)
         self._importer.on_pause = self._deadline.refuse_late
         self._importer.watchers.append(self._deadline.watcher)
-        self._energy = InterfaceEnergy(self._importer, general.connections)
-        self._sampler = self._make_sampler(general)
+        self._energy = InterfaceEnergy(self._importer, scene.connections)
+        self._sampler = self._make_sampler(scene)
         self._broken = False
 
-    def _make_sampler(self, general: GeneralScene) -> Sampler | None:
-        if general.rate is None or not general.variables:
-            return None
-        return Sampler(self._importer, [component_variable(name) for name in general.variables], general.rate)
+    def _make_sampler(self, scene: Scene) -> Sampler | None:
+        names = [component_variable(name) for name in scene.sampled]
+        return Sampler(self._importer, names, scene.sampling_rate) if names else None
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point from the scene's start values; a general scene carries no state over.
@@ -142,26 +141,25 @@ class GeneralRunner(Runner):
         self._build()
 
     def _run(self, scene: Scene) -> tuple[Outcome, str]:
-        general, record, execution = scene.general, scene.record, scene.execution
-        assert general is not None  # the constructor refuses any other
+        record, execution = scene.record, scene.execution
         self._deadline.begin(execution.deadline)
         self._limit, self._seen = execution.impact_limit, 0
         # what happens where the motion begins belongs to a recording that begins there
         self._events, self._recording = [], record.transient_time == 0.0
         start: dict[tuple[str, str], Value] = {
-            (c.name, name): value for c in general.components for name, value in c.parameters.items()
+            (c.name, name): value for c in scene.components for name, value in c.parameters.items()
         }
         self._importer.keeps_start = False
         for component in self._importer.components.values():
             component.instance.log.take()  # what it said in the point before is no reason for this one's end
-        self._set_gains(general)
-        self._importer.macro_step = general.macro_step
-        self._importer.contacts.take_numbers(general.stop_contacts, general.pairs)
+        self._set_gains(scene)
+        self._importer.macro_step = scene.macro_step
+        self._importer.contacts.take_numbers(scene.stop_contacts, scene.pairs)
         end = record.transient_time + record.recorded_time
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused at the end
                 self._importer.begin(0.0, start)
-                self._energy.begin(general.connections)
+                self._energy.begin(scene.connections)
                 self._importer.advance(record.transient_time)
                 self._recording = True
                 if record.transient_time:
@@ -194,9 +192,9 @@ class GeneralRunner(Runner):
             for name, component in self._importer.components.items()
             if component.instance.changed_rounding
         ]
-        if self.scene.record.impacts and len(self._general.contacts) > MOST_CONTACTS:
+        if self.scene.record.impacts and len(self.scene.contacts) > MOST_CONTACTS:
             remarks.append(
-                f"{len(self._general.contacts)} contacts: of more than {MOST_CONTACTS} no impacts are kept"
+                f"{len(self.scene.contacts)} contacts: of more than {MOST_CONTACTS} no impacts are kept"
             )
         remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
         remarks += [
@@ -212,10 +210,10 @@ class GeneralRunner(Runner):
                 )
         return remarks
 
-    def _set_gains(self, general: GeneralScene) -> None:
+    def _set_gains(self, scene: Scene) -> None:
         changed = False
         for transfer in (*self._importer.transfers, *self._importer.loops.transfers):
-            for connection in general.connections:
+            for connection in scene.connections:
                 if transfer.carries(connection) and transfer.gain_of(connection) != connection.gain:
                     transfer.set_gain(connection, connection.gain)
                     changed = True
@@ -230,11 +228,12 @@ class GeneralRunner(Runner):
         if self._sampler is None:
             return
         rows = self._sampler.rows
-        has_none = [self._is_without_value_at_times(name) for name in self._general.variables]
+        names = self.scene.sampled
+        has_none = [self._is_without_value_at_times(name) for name in names]
         bad = np.argwhere(~(np.isfinite(rows) | (np.isnan(rows) & [False, *has_none])))
         if len(bad):
             row, column = bad[0]
-            name = self._general.variables[column - 1]
+            name = names[column - 1]
             raise ComponentError(
                 f"{name}: expected a finite value, got {rows[row, column]} at time {rows[row, 0]:.17g}.",
                 instance=component_variable(name)[0],

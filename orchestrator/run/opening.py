@@ -23,7 +23,7 @@ def open_runner(
     SceneError, ComponentError
         The scene cannot run this way, or a component cannot be loaded.
     """
-    if scene.general is not None:
+    if not scene.is_one_body:
         # loaded by those who couple components
         from vibroimpact.orchestrator.run.general import GeneralRunner
 

@@ -158,8 +158,8 @@ def state_variables(scene: Scene) -> tuple[str, ...]:
     Of a chain those of its masses, of a beam those of its modes. Empty for an oscillator, whose state is that
     of the observed point, and for a general scene.
     """
-    body = scene.body_given
-    if body is None or isinstance(body, OscillatorBody):
+    body = scene.bodies[0]
+    if not isinstance(body, ChainBody | BeamBody):
         return ()
     kind = "" if isinstance(body, ChainBody) else "modal_"
     numbers = range(1, body.size + 1)
@@ -168,7 +168,7 @@ def state_variables(scene: Scene) -> tuple[str, ...]:
 
 def most_elements(scene: Scene) -> int:
     """Return how many masses or modes a structure has, where a sweep varies them the most of them; else 0."""
-    is_beam = isinstance(scene.body_given, BeamBody)  # the state of a chain is that of its masses
+    is_beam = isinstance(scene.bodies[0], BeamBody)  # the state of a chain is that of its masses
     swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES and is_beam]
     return int(swept[0]) if swept else len(state_variables(scene)) // 2
 

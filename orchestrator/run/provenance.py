@@ -47,7 +47,7 @@ def runs_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
 
 def _seed(scene: Scene) -> str:
     """Return what is random in a dataset: noise where channels are sampled that have some."""
-    if scene.general is not None:
+    if not scene.is_one_body:
         return "none of the scene's own; an FMU may have one among its parameters"
     if scene.noise is None or not scene.channels:
         return "none: nothing in the scene is random"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from vibroimpact.analysis.dataset import PERIOD_COLUMNS
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.run.empty_record import sample_variables
 from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
@@ -19,13 +18,13 @@ _SIZES = ("B", "kB", "MB", "GB", "TB", "PB")
 
 def bytes_of_a_run(scene: Scene) -> int:
     """Return the size of what one run records, but for impacts, whose number nobody knows before."""
-    record, general = scene.record, scene.general
-    periods = record.recorded_periods if (record.extrema or record.strobe) and general is None else 0
+    record = scene.record
+    periods = record.recorded_periods if (record.extrema or record.strobe) else 0
     # a period beyond all numbers is the body's to refuse
     rate = scene.sampling_rate
     samples = round(rate * _recorded_seconds(scene)) if rate else 0
     periods = periods if record.each_period else min(periods, 1)
-    numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(sample_variables(scene)))
+    numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(scene.sampled))
     return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))
 
 

@@ -171,7 +171,7 @@ class _SoundValues:
         self._scene, self._keys = scene, tuple(keys)
         self._low, self._high = [math.inf] * len(keys), [-math.inf] * len(keys)
         # between whole numbers there are others, and other components have rules of their own
-        self._has_gaps = scene.general is not None or any(is_whole(scene.field(key)) for key in keys)
+        self._has_gaps = not scene.is_one_body or any(is_whole(scene.field(key)) for key in keys)
 
     def holds(self, low: Sequence[float], high: Sequence[float]) -> bool:
         """Return whether all values from the least to the largest of each key are known to be sound."""

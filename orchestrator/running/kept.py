@@ -135,7 +135,7 @@ def opened_scene(
 
 def _key(scene: Scene, execution: str | None) -> tuple[Any, ...] | None:
     """Return what tells a scene and its components from others; None of a scene that is not kept."""
-    if scene.general is not None or scene.replay is not None or scene.is_guarded:
+    if not scene.is_lone_body or scene.execution.guard:
         return None
     try:
         files = tuple(file_state(path.stat()) for path in _components(FMU_NAMES[scene.body.kind]))

@@ -24,7 +24,7 @@ def open_scene(scene: Scene, *, execution: str | None = None) -> Runner:
         The scene cannot run this way, or a component cannot be loaded.
     """
     how = scene.execution.how if execution is None else execution
-    if scene.is_guarded:
+    if scene.execution.guard:
         # loaded by those whose components may crash
         from vibroimpact.orchestrator.guard import GuardedRunner
 

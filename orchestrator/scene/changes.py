@@ -1,21 +1,22 @@
-"""Changes of a scene, asked for by `--set KEY=VALUE` or from Python; they are made before the scene is checked."""
+"""Changes of a scene before it is checked, numbers in its text, and a start on its stops."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.safe_toml import MOST_PARTS, parse_toml
-from vibroimpact.orchestrator.scene.keys import ALTERNATIVES
+from vibroimpact.orchestrator.scene.keys import ALTERNATIVES, OVERRIDDEN_BY, Key, numeric_key
 from vibroimpact.orchestrator.scene.problems import CHANGES, KeyPath, Problem, key_path, quoted
 
 _PART = re.compile(
     r"""\s*(?P<name>[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')\s*(?P<places>(?:\[[1-9][0-9]{0,8}\]\s*)*)"""
 )
+START = "displacement_start"
 _FORM = "KEY=VALUE, the key as messages write it (stop[1].restitution=0.8)"
 _KEY_FORM = "a key as messages write it, such as stop[1].restitution"
 _VALUE = "a TOML value: a number, true, false, text, an array or a table"
@@ -81,13 +82,7 @@ def changed_document(
 
 
 def changed_values(document: Mapping[str, Any], values: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Return a document with other values, by key as messages write it; else as `changed_document`.
-
-    Raises
-    ------
-    SceneError
-        With all changes that cannot be made.
-    """
+    """Return a document with other values, by key as messages write it; else as `changed_document`."""
     problems, changes = [], []
     for key, value in values.items():
         path, rest = _path(key) if isinstance(key, str) else ((), "")
@@ -203,3 +198,135 @@ def _without_effect(document: Mapping[str, Any], change: Change) -> list[Problem
         return []
     hint = f"Set its values, {key_path(('sweep', key))}={{values=[...]}}, or sweep nothing: sweep={{}}."
     return [Problem(change.key, "a key that the scene does not sweep", "one of [sweep]", hint)]
+
+
+# ---- numbers in a text ----
+
+
+def text_with_values(text: str, values: Mapping[str, float], recordings: Sequence[str] = ()) -> str:
+    """Return the TOML text of a scene with other numbers.
+
+    A key that the text leaves at its default is added to its table, and one that would have the last word over a new
+    number (`damping_ratio` over `damping`) is taken out. Where an unusual layout cannot be kept, the same scene is
+    written without its comments.
+
+    Parameters
+    ----------
+    text : str
+        Of a scene that is valid.
+    values : mapping of str to float
+        By key, each a number of the scene.
+    recordings : sequence of str
+        What `replay.recordings` is to name; none to leave it as it is.
+
+    Examples
+    --------
+    >>> print(text_with_values("[body]\\nmass = 1 # kg\\nstiffness = 4.0", {"body.mass": 2.5}))
+    [body]
+    mass = 2.5 # kg
+    stiffness = 4.0
+    """
+    wanted = parse_toml(text)
+    _put_all(wanted, values, recordings)
+    # it takes time to load, and few scenes are written anew
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
+    try:
+        document = tomlkit.parse(text)
+        _put_all(document, values, recordings)
+        edited = tomlkit.dumps(document)
+        if parse_toml(edited) == wanted:
+            return edited
+    except (TOMLKitError, ValueError):
+        pass  # what tomlkit cannot read or has written wrong is written anew
+    return tomlkit.dumps(wanted)
+
+
+def _put_all(
+    document: MutableMapping[str, Any], values: Mapping[str, float], recordings: Sequence[str]
+) -> None:
+    for key, value in values.items():
+        _put(document, numeric_key(key), value)
+    if recordings:
+        table = document["replay"]
+        if len(table.get("recordings", ())) != len(recordings):
+            _set(table, "recordings", [""] * len(recordings))
+        for place, name in enumerate(recordings):
+            table["recordings"][place] = name
+
+
+def _put(document: MutableMapping[str, Any], key: Key, value: float) -> None:
+    if key.table == "execution" and key.table not in document:
+        document[key.table] = {}
+    table = key.owner_in(document)
+    table.pop(OVERRIDDEN_BY.get(key.name, ""), None)
+    if key.element is not None:
+        table[key.name][key.element] = value
+    else:
+        _set(table, key.name, key.typed(value))
+
+
+def _set(table: MutableMapping[str, Any], name: str, value: float | list[str]) -> None:
+    """Set a key; a new one goes after the last: comments at the end of a table are those of the next."""
+    from tomlkit.items import Table
+
+    if name in table or not isinstance(table, Table):
+        table[name] = value
+        return
+    body, rest = table.value.body, []
+    while body and body[-1][0] is None:
+        rest.append(body.pop())
+    table.append(name, value)
+    body.extend(reversed(rest))
+
+
+# ---- a start on the stops ----
+
+
+def with_resting_start(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a document in which a start that is not written is on the rigid stops that keep the body from 0.
+
+    Examples
+    --------
+    >>> with_resting_start({"body": {"mass": 1.0}, "stop": [{"position": -0.5}]})["body"]
+    {'mass': 1.0, 'displacement_start': -0.5}
+    """
+    found = deepcopy(dict(document))
+    body = found.get("body")
+    if not isinstance(body, dict) or START in body or f"body.{START}" in _table_of(found.get("sweep")):
+        return found
+    kind, masses = body.get("kind", "oscillator"), body.get("masses")
+    size = len(masses) if kind == "chain" and isinstance(masses, list) else 1
+    starts = [0.0] * size
+    for side, position, mass in _rigid_limits(found, size):
+        if 1 <= mass <= size:
+            nearest = min if side == "upper" else max
+            starts[mass - 1] = nearest(starts[mass - 1], position)
+    if any(starts) and kind in ("oscillator", "chain"):
+        body[START] = starts if kind == "chain" else starts[0]
+    return found
+
+
+def _rigid_limits(document: Mapping[str, Any], size: int) -> Iterator[tuple[str, float, int]]:
+    """Yield side, position at its worst over the sweep, and mass of each rigid stop: as given, or the last."""
+    stops, swept = document.get("stop"), _table_of(document.get("sweep"))
+    for number, stop in enumerate(stops if isinstance(stops, list) else [], start=1):
+        if not isinstance(stop, dict) or stop.get("law", "restitution") != "restitution":
+            continue
+        side, mass = stop.get("side", "upper"), stop.get("mass", size)
+        positions = [*_axis_values(swept.get(f"stop[{number}].position")), stop.get("position")]
+        known = [float(each) for each in positions if type(each) in (int, float) and each == each]
+        if known and type(mass) is int:
+            yield side, (min(known) if side == "upper" else max(known)), mass
+
+
+def _axis_values(axis: Any) -> list[Any]:
+    """Return the ends or the values of a swept key, as written."""
+    table = _table_of(axis)
+    values = table.get("values")
+    return [*(values if isinstance(values, list) else []), table.get("start"), table.get("stop")]
+
+
+def _table_of(raw: Any) -> Mapping[str, Any]:
+    return raw if isinstance(raw, dict) else {}

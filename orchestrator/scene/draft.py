@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
-from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor, channels_in
+from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
 from vibroimpact.orchestrator.scene.models import (
     STOP_MODELS,
     Execution,
@@ -30,6 +30,7 @@ from vibroimpact.orchestrator.scene.problems import (
     read_table,
 )
 from vibroimpact.orchestrator.scene.replay_models import Replay
+from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
@@ -74,27 +75,28 @@ class DraftTables:
         if isinstance(kind, str) and kind in models:
             there = len(self.problems)
             table = self.read(models[kind], raw, path)
-            belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
-            self.problems[there:] = [
-                replace(problem, hint=belongs.get(problem.key, problem.hint))
-                for problem in self.problems[there:]
-            ]
+            if table is None:
+                belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
+                self.problems[there:] = [
+                    replace(problem, hint=belongs.get(problem.key, problem.hint))
+                    for problem in self.problems[there:]
+                ]
             return table
         model = models[default]
         self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
         return None
 
 
-class Draft(DraftTables):
-    """A scene of the short form on its way.
+class Reading(NamedTuple):
+    """What is read of a document in one of its forms: its draft, what is wrong between its tables, its parts else."""
 
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document; a swept key need not be written.
-    axes : tuple of SweepAxis
-        Its sweep.
-    """
+    draft: DraftTables
+    problems: list[Problem]
+    parts: Callable[[], dict[str, Any]]
+
+
+class Draft(DraftTables):
+    """A scene of one body on its way; a key that its axes sweep need not be written."""
 
     def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
         super().__init__(with_swept_keys(document, axes))

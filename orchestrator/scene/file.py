@@ -36,13 +36,7 @@ _VALUE = "a value that TOML has: a number, True, False, text, a sequence or a ma
 
 
 def read_scene_text(path: Path, source: str) -> str:
-    """Return the text of a scene file.
-
-    Raises
-    ------
-    SceneError
-        When the file is absent, cannot be read, is too large, or is not UTF-8.
-    """
+    """Return the text of a scene file."""
     content = _read_bytes(path, source)
     try:
         return content.decode("utf-8-sig")

@@ -146,15 +146,7 @@ def with_alternatives(texts: Iterable[str]) -> set[str]:
 
 
 def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:
-    """Yield each number of a table that a sweep may vary, with its key; of two related keys the one that counts.
-
-    Parameters
-    ----------
-    owner : BaseModel
-        The table.
-    table : str
-        Its name in keys: `body`, or `stop[1]`.
-    """
+    """Yield each number of a table that a sweep may vary, with its key; of two related keys the one that counts."""
     for word in SWEEPABLE[table.partition("[")[0]]:
         value = getattr(owner, word, None)
         if getattr(owner, OVERRIDDEN_BY.get(word, ""), None) is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
-from vibroimpact.orchestrator.scene.called import called_by_numbers
+from vibroimpact.orchestrator.scene.called_effects import called_by_numbers
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, RestitutionStop
 from vibroimpact.orchestrator.scene.scene import Scene
@@ -31,13 +31,13 @@ def goes_by_lanes(scene: Scene) -> bool:
 
 def may_go_by_lanes(scene: Scene) -> bool:
     """Whether lanes can run the points of a scene: its body flies as few modes between few rigid stops."""
-    body = scene.body_given
-    if body is None or scene.replay is not None or scene.is_measured or scene.exciter is not None:
+    if not scene.is_lone_body or scene.is_measured or scene.exciter is not None:
         return False
     if scene.record.time_series is not None or AMPLITUDE in called_by_numbers(scene):
         return False
     if len(scene.stops) > core.MOST_CONTACTS or not all(isinstance(s, RestitutionStop) for s in scene.stops):
         return False
+    body = scene.body
     if isinstance(body, OscillatorBody):
         return True
     if body.modes == "auto" or any(axis.key == MODES for axis in scene.sweep):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -36,15 +35,6 @@ CHANNELS = (*MEASURED_SENSOR, LOAD_CELL, DRIVE)
 def channel_number(channel: str) -> int:
     """Return the number of a channel, which tells its noise from that of others under one seed."""
     return CHANNELS.index(channel)
-
-
-def channels_in(names: Iterable[str]) -> tuple[str, ...]:
-    """Return those of some variables that are channels of a measuring chain.
-
-    >>> channels_in(["velocity", "drive", "sensor.velocity"])
-    ('drive', 'sensor.velocity')
-    """
-    return tuple(name for name in names if name in CHANNELS)
 
 
 FALLING_FORCE = "force that falls with distance"

@@ -220,17 +220,7 @@ def _brackets(path: KeyPath) -> str:
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], table: KeyPath) -> list[Problem]:
-    """Translate what pydantic found in one table.
-
-    Parameters
-    ----------
-    error : ValidationError
-        The error of validating the table.
-    model : type of BaseModel
-        The model of the table; its fields carry a `Rule`.
-    table : tuple
-        Where the table is, for example ("stop", 0).
-    """
+    """Return what pydantic found in the table at a path, as problems."""
     entries = [
         {**entry, "loc": _as_written(entry["loc"])}
         for entry in error.errors(include_url=False, include_context=False)

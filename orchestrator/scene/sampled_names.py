@@ -23,6 +23,15 @@ _ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 _FOLLOWED = ("modal_energy[", "energy.")
 
 
+def channels_in(names: Iterable[str]) -> tuple[str, ...]:
+    """Return those of some variables that are channels of a measuring chain.
+
+    >>> channels_in(["velocity", "drive", "sensor.velocity"])
+    ('drive', 'sensor.velocity')
+    """
+    return tuple(filter(CHANNELS.__contains__, names))
+
+
 def channel_names(tables: Container[str]) -> tuple[str, ...]:
     """Return the channels, in V, that a scene with these tables can sample.
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.importer.specification import PairSpec, StopContactSpec
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
-from vibroimpact.orchestrator.scene.called import called_by_numbers
-from vibroimpact.orchestrator.scene.component_effects import called_by_components
+from vibroimpact.orchestrator.scene.called_effects import called_by_components, called_by_numbers
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
@@ -30,10 +29,10 @@ def engine(scene: Scene, execution: str = "auto") -> str:
     >>> engine(parse_scene(text, "free.toml"))
     'fused: Oscillator, one mass, closed form between impacts'
     """
-    if scene.general is not None:
-        names = ", ".join(component.name for component in scene.general.components)
-        step = f"{scene.general.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
-        return f"coupled: {names}; {scene.general.exchange} exchange every {step}"
+    if not scene.is_one_body:
+        names = ", ".join(component.name for component in scene.components)
+        step = f"{scene.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
+        return f"coupled: {names}; {scene.execution.exchange} exchange every {step}"
     if scene.replay is not None:
         return f"replay from sample to sample: {_body(scene)}"
     if scene.execution.how == "coupled":
@@ -68,32 +67,33 @@ def laws(scene: Scene) -> dict[str, str]:
 
 def contacts(scene: Scene) -> dict[str, str]:
     """Return what meets what in each contact of a general scene, by the key of the contact."""
-    found = () if scene.general is None else scene.general.contacts
-    return {
-        f"contact[{number}]": f"{contact.name}, {contact.law}"
-        if isinstance(contact, PairSpec)
-        else f"{contact.body}.{contact.displacement} on {contact.stop}, force held over a step"
-        for number, contact in enumerate(found, start=1)
-    }
+    meetings = enumerate(scene.meetings, start=1)
+    return {f"contact[{number}]": _met(contact) for number, contact in meetings}
+
+
+def _met(contact: StopContactSpec | PairSpec) -> str:
+    if isinstance(contact, PairSpec):
+        return f"{contact.name}, {contact.law}"
+    return f"{contact.body}.{contact.displacement} on {contact.stop}, force held over a step"
 
 
 def effects(scene: Scene) -> dict[str, bool]:
     """Return by its name whether a scene calls for an effect, at one of its points at least."""
     common = {
-        "time series": _samples(scene),
+        "time series": scene.record.time_series is not None,
         "continuation": any(axis.continuation for axis in scene.sweep),
-        "guard process": scene.is_guarded,
+        "guard process": scene.execution.guard,
     }
-    if scene.general is not None:
-        called = called_by_components(scene.general, scene.sweep)
+    if not scene.is_one_body:
+        called = called_by_components(scene)
         found = {
-            "connections": bool(scene.general.connections),
-            "contacts": bool(scene.general.contacts),
-            "watched events": bool(scene.general.events),
+            "connections": bool(scene.connections),
+            "contacts": bool(scene.contacts),
+            "watched events": bool(scene.events),
         }
         return {name: name in called for name in EFFECTS_OF_THE_SHORT_FORM} | found | common
-    called, series = called_by_numbers(scene), scene.record.time_series
-    followed = not isinstance(scene.body, OscillatorBody) and series is not None
+    called = called_by_numbers(scene)
+    followed = not isinstance(scene.body, OscillatorBody)
     return {
         "forcing": scene.forcing is not None,
         "recorded drive": scene.replay is not None and scene.replay.drive is not None,
@@ -101,7 +101,7 @@ def effects(scene: Scene) -> dict[str, bool]:
         "stops": bool(scene.stops),
         FALLING_RESTITUTION: FALLING_RESTITUTION in called,
         AMPLITUDE: AMPLITUDE in called,
-        "energies": followed and series is not None and follow_energies(series.variables),
+        "energies": followed and follow_energies(scene.sampled),
         **{name: bool(keys) for name, keys in chain_effects(scene).items()},
         **common,
     }
@@ -109,10 +109,9 @@ def effects(scene: Scene) -> dict[str, bool]:
 
 def chain_effects(scene: Scene) -> dict[str, list[str]]:
     """Return by its name which tables or numbers of a scene of the short form ask for a part of the measuring chain."""
-    series, sensor, exciter = scene.record.time_series, scene.sensor, scene.exciter
-    sampled = () if series is None else series.variables
+    sensor, exciter = scene.sensor, scene.exciter
     readings = sensor is not None and (
-        scene.replay is not None or any(name in MEASURED_SENSOR for name in sampled)
+        scene.replay is not None or any(name in MEASURED_SENSOR for name in scene.sampled)
     )
     return {
         "sensor": ["sensor"] if readings else [],
@@ -122,12 +121,6 @@ def chain_effects(scene: Scene) -> dict[str, list[str]]:
         "noise": ["noise"] if scene.noise is not None else [],
         "AD conversion": ["daq"] if scene.daq is not None else [],
     }
-
-
-def _samples(scene: Scene) -> bool:
-    if scene.general is not None:
-        return scene.general.rate is not None and bool(scene.general.variables)
-    return scene.record.time_series is not None
 
 
 def in_one_line(scene: Scene, execution: str = "auto") -> str:

@@ -176,17 +176,7 @@ def _company_problems(key: str, table: AxisTable) -> Iterator[Problem]:
 def axes_of(
     tables: Mapping[str, AxisTable], sample: object, *, expects_keys: bool = True
 ) -> tuple[list[SweepAxis], list[Problem]]:
-    """Return the axes of a sweep that have no problem, in the order of the scene, and what is wrong with the others.
-
-    Parameters
-    ----------
-    tables : mapping of str to AxisTable
-        Its entries, each sound by itself.
-    sample : object
-        Its entry `sample` as written; None without.
-    expects_keys : bool
-        Whether a design without keys is a problem.
-    """
+    """Return the axes of a sweep that have no problem, in the order of the scene, and what is wrong with the others."""
     problems: list[Problem] = []
     if isinstance(sample, dict) and expects_keys and not any(t.distribution for t in tables.values()):
         hint = 'Give a key a distribution: { distribution = "uniform", low = 0.5, high = 0.9 }.'

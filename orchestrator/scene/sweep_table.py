@@ -37,24 +37,7 @@ def read_sweep(
     key_problems: Callable[[str, object], Iterable[Problem]],
     axis_problems: Callable[[SweepAxis], Iterable[Problem]],
 ) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
-    """Read the sweep of any form of scene.
-
-    Parameters
-    ----------
-    document : mapping
-        The parsed TOML document; its other tables need not be valid.
-    key_problems : callable
-        Yields what is wrong with a key and its entry.
-    axis_problems : callable
-        Yields what is wrong with the values of an axis.
-
-    Returns
-    -------
-    axes : tuple of SweepAxis
-        The axes without a problem, in the order of the file.
-    problems : list of Problem
-        Everything that is wrong with the others.
-    """
+    """Return the sound axes of any form of scene, in the order of the file, and what is wrong with the others."""
     table = document.get("sweep", {})
     if not isinstance(table, dict):
         hint = f"Write [sweep] and below it KEY = {FORMS}."

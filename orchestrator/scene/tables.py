@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.orchestrator.scene.draft import Draft
+from vibroimpact.orchestrator.scene.draft import Draft, Reading
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.models import Record
 from vibroimpact.orchestrator.scene.problems import Problem, quoted, unknown_key
@@ -19,22 +20,7 @@ _COMMON_TABLES = ("record", "sweep", "execution")
 
 
 def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
-    """Validate the tables of a document.
-
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document, whatever is in it.
-    folder : Path
-        The folder of the scene file, from which the paths in it count.
-
-    Returns
-    -------
-    fields : dict
-        The fields of the `Scene`; they are to be used only where there is no problem.
-    problems : list of Problem
-        All of them, in the order of the tables.
-    """
+    """Return the parts of a scene, to be used only where there is no problem, and all that is wrong with its tables."""
     general = [name for name in _GENERAL_TABLES if name in document]
     short = [name for name in _SHORT_TABLES if name in document]
     if general and short:
@@ -43,12 +29,13 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
     unknown = list(_table_problems(document, ("scene", *own, *_COMMON_TABLES)))
     if general:
         # What reads model descriptions takes time to load, and the short form does not need it.
-        from vibroimpact.orchestrator.scene.general.tables import read_general
+        from vibroimpact.orchestrator.scene.component_tables import read_components
 
-        fields, problems = read_general(document, folder)
+        reading = read_components(document, folder)
     else:
-        fields, problems = _read_short(document)
-    return fields, unknown + problems
+        reading = _read_body(document)
+    problems = [*unknown, *reading.draft.problems, *reading.problems]
+    return ({}, problems) if problems else ({**dict(reading.draft.header or {}), **reading.parts()}, [])
 
 
 def _mixed_problem(general: list[str], short: list[str]) -> Problem:
@@ -60,26 +47,23 @@ def _mixed_problem(general: list[str], short: list[str]) -> Problem:
     return Problem(general[0], expected, got, hint)
 
 
-def _read_short(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    axes, sweep_problems = read_short_sweep(document)
+def _read_body(document: Mapping[str, Any]) -> Reading:
+    axes, wrong_axes = read_short_sweep(document) if "sweep" in document else ((), [])
     draft = Draft(document, axes)
-    problems = draft.problems + sweep_problems + rule_problems(draft)
-    if problems:
-        return {}, problems
-    assert draft.header is not None
+    return Reading(draft, wrong_axes + rule_problems(draft), partial(_parts, draft))
+
+
+def _parts(draft: Draft) -> dict[str, Any]:
     assert draft.record is not None
     return {
-        **dict(draft.header),
-        "body": draft.body,
-        "forcing": draft.forcing,
-        "stops": draft.stops,
-        "sensor": draft.sensor,
-        **{name: getattr(draft, name) for name in CHAIN_TABLES},
+        "bodies": (draft.body,),
+        "contacts": draft.stops,
         "record": _applicable(draft.record),
-        "sweep": axes + (draft.replay.axes if draft.replay else ()),
-        "execution": draft.execution,
-        "replay": draft.replay,
-    }, []
+        "sweep": draft.axes + (draft.replay.axes if draft.replay else ()),
+        **{
+            name: getattr(draft, name) for name in ("forcing", "sensor", *CHAIN_TABLES, "execution", "replay")
+        },
+    }
 
 
 def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Problem]:

@@ -9,11 +9,10 @@ from typing import Any
 from vibroimpact.fmus.html_view import html_table
 from vibroimpact.fmus.printable import printable
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.orchestrator.scene.models import SceneTable
 from vibroimpact.orchestrator.scene.sweep import run_count
 
 
-class ViewedScene(SceneTable):
+class ViewedScene:
     """A scene as notebooks show it."""
 
     def __repr__(self) -> str:

@@ -67,8 +67,7 @@ def export_system(
     ComponentError
         There is no library for a platform, and nothing to compile it with.
     """
-    general = scene.general
-    if general is None:
+    if scene.is_one_body:
         raise UsageError(
             f"{scene.source}: expected a scene of components, got one of a body. "
             "`vibroimpact fmu export` makes an FMU of it."
@@ -84,13 +83,13 @@ def export_system(
     fmi = fmi or ("2.0" if ssp == "1.0" else None)
     with ScratchFolder("ssp") as folder:
         travel = Travel(Path(folder.name), fmi, duration, gains == "component", platform, note)
-        parts = component_members(general, travel)
+        parts = component_members(scene, travel)
         members = {part.member: part.content for part in parts.values()}
     for part in parts.values():
         if part.values:
             members[part.values_member] = parameter_set(part, ssp)
     try:
-        members[SSD_FILE] = description(scene, general, parts, ssp, duration)
+        members[SSD_FILE] = description(scene, parts, ssp, duration)
     except SceneError as error:
         raise UsageError(error.message) from None
     members |= swept_members(scene, parts, ssp)
@@ -105,7 +104,7 @@ def export_system(
                 *(Argument("gains"), " transformation"),
             )
         )
-    for component in general.components:
+    for component in scene.components:
         if component.tolerance is not None:
             note(
                 f"component.{component.name}.tolerance: a system has no word for it: its FMU runs with its own"

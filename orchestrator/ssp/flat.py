@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from vibroimpact.fmus.units import Unit, agree, gain_unit_between
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.names import GIVING, TAKING
 from vibroimpact.orchestrator.ssp.refusal import RefusalError

@@ -25,8 +25,8 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.changes import changed_document
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, component_facts
 from vibroimpact.orchestrator.scene.file import LARGEST_FILE
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, component_facts
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path, components_of

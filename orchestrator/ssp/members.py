@@ -14,12 +14,12 @@ from vibroimpact.fmus.packaging.export import LEAN_COUNTS, export_fmu
 from vibroimpact.fmus.shipped import FOLDERS, package_folder
 from vibroimpact.fmus.units import parse_unit
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
-from vibroimpact.orchestrator.scene.general.component_facts import (
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.component_facts import (
     ComponentFacts,
     StartValue,
     component_facts,
 )
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.ssp.names import GAIN
 
 FMI_OF_GAINS = "2.0"
@@ -69,15 +69,15 @@ class Travel:
     note: Note = lambda _: None
 
 
-def component_members(general: GeneralScene, travel: Travel) -> dict[str, Part]:
+def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
     """Return the components of a scene as they travel, by name; gains come after the others."""
     described = {component.name: component for component in read_components()}
     taken: dict[str, str] = {}
     parts = {}
-    for spec in general.components:
+    for spec in scene.components:
         own, file = _own(spec.fmu), spec.fmu
         if own is not None:
-            file = _exported(described[own[0]], spec, _used(general, spec), travel.fmi or own[1], travel)
+            file = _exported(described[own[0]], spec, _used(scene, spec), travel.fmi or own[1], travel)
         content = file.read_bytes()
         parts[spec.name] = Part(
             spec.name,
@@ -89,7 +89,7 @@ def component_members(general: GeneralScene, travel: Travel) -> dict[str, Part]:
         )
     if not travel.gains:
         return parts
-    for number, connection in enumerate(general.connections, start=1):
+    for number, connection in enumerate(scene.connections, start=1):
         if connection.gain != 1.0 or connection.gain_unit is not None:
             gain = _gain(connection, _free_name(f"gain_{number}", parts), parts, taken, travel)
             parts[gain.name] = gain
@@ -152,9 +152,9 @@ def _own(fmu: Path) -> tuple[str, str] | None:
     return (fmu.stem, versions[fmu.parent.name]) if own else None
 
 
-def _used(general: GeneralScene, spec: ComponentSpec) -> set[str]:
+def _used(scene: Scene, spec: ComponentSpec) -> set[str]:
     """Return the variables of a component that the system cannot do without."""
-    ends = (end for connection in general.connections for end in (connection.source, connection.target))
+    ends = (end for connection in scene.connections for end in (connection.source, connection.target))
     return {variable for component, variable in ends if component == spec.name} | set(spec.parameters)
 
 

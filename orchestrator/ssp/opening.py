@@ -52,16 +52,15 @@ def opened_scene(
 
 def _say_findings(path: str | PathLike[str], scene: Scene, strict: bool) -> None:
     """Say what is assumed of the FMUs of a scene, or refuse it; count what is only odd."""
-    general = scene.general
-    if general is None:
+    if scene.is_one_body:
         return
-    if strict and general.doubts:
-        raise SceneError([f"{path}: {doubt}" for doubt in general.doubts])
-    say_notes(f"may run wrong: {doubt}" for doubt in general.doubts)
+    if strict and scene.doubts:
+        raise SceneError([f"{path}: {doubt}" for doubt in scene.doubts])
+    say_notes(f"may run wrong: {doubt}" for doubt in scene.doubts)
     say_notes(
         f"{file}: {count} remark{'s' if count > 1 else ''} on its description, which change no number. "
         f"`vibroimpact fmu check` shows them."
-        for file, count in general.remarks.items()
+        for file, count in scene.remarks.items()
     )
 
 

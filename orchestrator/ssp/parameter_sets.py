@@ -11,8 +11,8 @@ from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.packaging.zip_members import opened
 from vibroimpact.fmus.safe_xml import LARGEST_XML, root_of
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
-from vibroimpact.orchestrator.scene.general.scene import gain_place
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.component_numbers import gain_place
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path
 from vibroimpact.orchestrator.ssp.scene_tables import names_of

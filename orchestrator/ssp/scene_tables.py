@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.orchestrator.scene.general.component_facts import NUMERIC_KINDS, ComponentFacts
+from vibroimpact.orchestrator.scene.component_facts import NUMERIC_KINDS, ComponentFacts
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Link, Node, Path
 from vibroimpact.orchestrator.ssp.names import SSD_FILE

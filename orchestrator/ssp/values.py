@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 from vibroimpact.fmus.units import BASE_UNITS, Unit, agree, declared_unit
-from vibroimpact.orchestrator.scene.general.component_facts import (
+from vibroimpact.orchestrator.scene.component_facts import (
     Misfit,
     StartValue,
     VariableFacts,

@@ -15,8 +15,8 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.units import BASE_UNITS, Unit, agree
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.general.component_facts import NUMERIC_KINDS, StartValue, VariableFacts
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable, gain_place
+from vibroimpact.orchestrator.scene.component_facts import NUMERIC_KINDS, StartValue, VariableFacts
+from vibroimpact.orchestrator.scene.component_numbers import component_variable, gain_place
 from vibroimpact.orchestrator.ssp.members import Part
 from vibroimpact.orchestrator.ssp.names import (
     ANNOTATION,
@@ -47,9 +47,7 @@ _TYPES = {
 """Types of connectors; of an enumeration its numbers, which every tool sets."""
 
 
-def description(
-    scene: Scene, general: GeneralScene, parts: Mapping[str, Part], ssp: str, duration: float
-) -> bytes:
+def description(scene: Scene, parts: Mapping[str, Part], ssp: str, duration: float) -> bytes:
     """Return the SSD of a scene.
 
     A connection from what this version of SSP has no word for raises UsageError.
@@ -64,30 +62,30 @@ def description(
         binding = SubElement(bindings, "ssd:ParameterBinding", source=SWEPT_VALUES)
         SubElement(binding, "ssd:ParameterMapping", source=SWEPT_MAPPING)
     elements = SubElement(system, "ssd:Elements")
-    shown = {part.name: _shown(part, general, scene, ssp) for part in parts.values()}
+    shown = {part.name: _shown(part, scene, ssp) for part in parts.values()}
     for part in parts.values():
         _component(elements, part, shown[part.name])
-    if general.connections:
+    if scene.connections:
         joined = SubElement(system, "ssd:Connections")
         gains = {part.gain_of: part.name for part in parts.values() if part.gain_of is not None}
-        for connection in general.connections:
+        for connection in scene.connections:
             if connection in gains:
                 _through(joined, connection, gains[connection])
             else:
                 _connection(joined, connection, parts)
-    _master(system, general)
+    _master(system, scene)
     _units(root, [variable for variables in shown.values() for variable in variables])
     experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(duration))
     annotations = SubElement(experiment, "ssd:Annotations")  # OMSimulator takes none of the whole description
-    if general.connections:
+    if scene.connections:
         step = SubElement(annotations, "ssc:Annotation", type=OSP_ANNOTATION)
         algorithm = SubElement(step, "osp:Algorithm")
-        SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(general.macro_step))
+        SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(scene.macro_step))
     tables = {name: table for name, table in parse_toml(scene.text).items() if name not in OWN_TABLES}
     own = SubElement(annotations, "ssc:Annotation", type=ANNOTATION)
     noted = SubElement(own, "vibroimpact:Scene")
     SubElement(noted, "vibroimpact:Tables").text = tomli_w.dumps(tables)
-    for name, attributes in _notes(general, parts):
+    for name, attributes in _notes(scene, parts):
         SubElement(noted, f"vibroimpact:{name}", attributes)
     return _written(root)
 
@@ -113,15 +111,13 @@ def swept_values(scene: Scene, parts: Mapping[str, Part]) -> dict[str, tuple[str
 
     A coordinate is what a dataset calls a swept key: `mass` of `b.mass`. A gain is one where it is a component.
     """
-    assert scene.general is not None
     gains = {part.gain_of: part.name for part in parts.values() if part.gain_of is not None}
     found = {}
     for axis in scene.sweep:
         place = gain_place(axis.key)
+        end = component_variable(axis.key)
         if place is not None:
-            end = gains.get(scene.general.connections[place], ""), "gain"
-        else:
-            end = component_variable(axis.key)
+            end = gains.get(scene.connections[place], ""), "gain"
         if end[0] in parts and end[1] in parts[end[0]].values:
             found[scene.sweep_coordinate_name(axis.key)] = end
     return found
@@ -145,14 +141,14 @@ def swept_members(scene: Scene, parts: Mapping[str, Part], ssp: str) -> dict[str
     return {SWEPT_VALUES: _parameter_set("sweep", values, ssp), SWEPT_MAPPING: _written(mapping)}
 
 
-def _notes(general: GeneralScene, parts: Mapping[str, Part]) -> Iterator[tuple[str, dict[str, str]]]:
+def _notes(scene: Scene, parts: Mapping[str, Part]) -> Iterator[tuple[str, dict[str, str]]]:
     """Yield what SSP has no words for, element by element; OMSimulator takes no annotations of elements."""
     for part in parts.values():
         if part.fmu:
             yield "Component", {"name": part.name, "fmu": part.fmu, "fmi": part.fmi}
         elif part.gain_of is not None:
             yield "Gain", {"name": part.name} | _unit(part.gain_of)
-    for connection in general.connections:
+    for connection in scene.connections:
         element, connector = connection.target
         if connection.gain_unit is not None:
             yield "Connection", {"endElement": element, "endConnector": connector} | _unit(connection)
@@ -175,10 +171,10 @@ def _written(root: Element) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _shown(part: Part, general: GeneralScene, scene: Scene, ssp: str) -> list[VariableFacts]:
+def _shown(part: Part, scene: Scene, ssp: str) -> list[VariableFacts]:
     """Return the variables that are connectors: what is connected, and the outputs that are recorded."""
     names: dict[str, None] = {}
-    for number, connection in enumerate(general.connections, start=1):
+    for number, connection in enumerate(scene.connections, start=1):
         for end, (component, name) in (("from", connection.source), ("to", connection.target)):
             if component == part.name:
                 names[name] = None
@@ -187,7 +183,7 @@ def _shown(part: Part, general: GeneralScene, scene: Scene, ssp: str) -> list[Va
                 )
     if part.gain_of is not None:
         names |= {"input": None, "output": None}
-    recorded = (component_variable(reference) for reference in general.variables)
+    recorded = (component_variable(reference) for reference in scene.sampled)
     for component, name in recorded:
         variable = part.facts.variables.get(name) if component == part.name else None
         if variable is not None and variable.causality in KINDS[ssp] and variable.kind in NUMERIC_KINDS:
@@ -262,9 +258,10 @@ def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
         )
 
 
-def _master(system: Element, general: GeneralScene) -> None:
+def _master(system: Element, scene: Scene) -> None:
     """Say how OMSimulator is to step: as often as values are exchanged, and as they are sampled."""
-    step = general.macro_step if general.rate is None else min(general.macro_step, 1.0 / general.rate)
+    rate = scene.sampling_rate
+    step = min(scene.macro_step, 1.0 / rate) if rate else scene.macro_step
     annotations = SubElement(system, "ssd:Annotations")
     own = SubElement(SubElement(annotations, "ssc:Annotation", type=OMS_ANNOTATION), "oms:Annotations")
     about = SubElement(own, "oms:SimulationInformation")

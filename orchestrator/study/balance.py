@@ -53,7 +53,7 @@ def balance_of(scene: Scene) -> float:
     scene : Scene
         Of the short form, without a sweep. It is run once more, since energies take time.
     """
-    if scene.general is not None or scene.replay is not None or isinstance(scene.body, OscillatorBody):
+    if not scene.is_lone_body or isinstance(scene.body, OscillatorBody):
         return math.nan
     begin, end = recorded_window(scene, float_parameters(scene, None))
     series = {"rate": SAMPLES / (end - begin), "variables": list(BALANCED)}

@@ -143,7 +143,7 @@ def effects_of(scene: Scene) -> list[Effect]:
 
 
 def _found(scene: Scene) -> Iterator[Effect | None]:
-    if scene.general is None:
+    if scene.is_one_body:
         yield from _of_numbers(scene)
         for number, (key, law) in enumerate(laws(scene).items()):
             yield _without(scene, f"{law} stop", key, _removes("stop", number))
@@ -172,14 +172,14 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
     else:
         if called_effects(scene)["time series"]:
             yield _without(scene, "samples", "record.variables", _no_samples, keeps=True)
-        for component in scene.general.components:
+        for component in scene.components:
             yield _without_component(scene, component.name)
         for table, name in (("event", "watched event"), ("contact", "contact of bodies")):
             for number in range(len(parse_toml(scene.text).get(table, ()))):
                 yield _without(
                     scene, f"{name} {number + 1}", f"{table}[{number + 1}]", _removes(table, number)
                 )
-        if scene.general.guard and "guard" in parse_toml(scene.text).get("execution", {}):
+        if scene.execution.guard and "guard" in parse_toml(scene.text).get("execution", {}):
             yield _without(
                 scene, "guard process", "execution.guard", _sets("execution", "guard", False), keeps=True
             )
@@ -249,7 +249,7 @@ def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
             called.setdefault(effect, []).append(key)
     if scene.forcing is not None and np.any(scene.forcing.amplitude):
         called["forcing"] = ["forcing.amplitude"]
-    if getattr(scene.body_given, "rayleigh", None) is not None:
+    if getattr(scene.body, "rayleigh", None) is not None:
         called.setdefault(DAMPING, []).append("body.rayleigh")
     for name, keys in called.items():
         yield _without(scene, name, ", ".join(keys), _zeros(keys))
@@ -261,7 +261,7 @@ def _without(
     """Return an effect, compared with or without a time series; None where the scene is none without it."""
     document = parse_toml(scene.text)
     document.pop("sweep", None)
-    if key != SERIES and not series and scene.general is None:
+    if key != SERIES and not series and scene.is_one_body:
         document.get("record", {}).pop("time_series", None)
     base = Scene.from_dict(document, scene.source)
     change(document)
@@ -390,7 +390,7 @@ class _Compared:
         share = replace(share, changes=words, change=change)
         if alone.failure:
             return share
-        if self._scene.general is not None:
+        if not self._scene.is_one_body:
             return self._by_samples(share, alone, reference)
         base = share.effect.base
         if base not in self._motions:

@@ -47,7 +47,7 @@ def memory_of_ways(
         By place; what a process that died would have taken is missing, and ways for which no time was left. Nothing
         where the system does not tell, or the FMUs run in processes of their own.
     """
-    guarded = scene.is_guarded
+    guarded = scene.execution.guard
     if guarded or not IS_MEASURED:
         return {}
     try:

@@ -152,7 +152,7 @@ def _largest(points: int) -> str:
 
 
 def _finds_modes(scene: Scene) -> bool:
-    return isinstance(scene.body_given, BeamBody | ChainBody) and scene.body_given.modes == "auto"
+    return isinstance(scene.bodies[0], BeamBody | ChainBody) and scene.bodies[0].modes == "auto"
 
 
 def _error_of_solution(scene: Scene, run: Observation) -> float:

@@ -15,7 +15,6 @@ from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.models import (
     KelvinVoigtStop,
     RestitutionStop,
@@ -85,8 +84,7 @@ def _finest_exchange(scene: Scene) -> Reference:
     Its error is told by the run at twice its step, and by the order that this and the one at four times show; whether
     the motion is chaotic by runs at the scene's own step.
     """
-    assert scene.general is not None
-    scales, own, best = scales_of(scene), scene.general.macro_step, best_of(scene)
+    scales, own, best = scales_of(scene), scene.macro_step, best_of(scene)
     steps = [{"execution.macro_step": own * FINEST_STEP * part} for part in (4.0, 2.0)]
     coarse, middle = (observed(best.with_values(step)) for step in steps)
     finest = observed(best)
@@ -103,8 +101,8 @@ def _finest_exchange(scene: Scene) -> Reference:
 
 def best_of(scene: Scene) -> Scene:
     """Return a scene as its reference runs: fused, with the finest tolerance of contacts, or the finest exchange."""
-    if scene.general is not None:
-        step = scene.general.macro_step * FINEST_STEP
+    if not scene.is_one_body:
+        step = scene.macro_step * FINEST_STEP
         return scene.with_values({"execution.macro_step": step, "execution.exchange": "iterated"})
     best = scene.with_values({"execution.how": "fused"})
     return best.with_values({"execution.contact_tolerance": FINEST}) if _is_integrated(scene) else best
@@ -125,9 +123,9 @@ def sensitivity_of(scene: Scene, scales: Scales) -> float:
 
 def scales_of(scene: Scene, part: float = 1.0) -> Scales:
     """Return what errors of a scene are relative to, of the first part of its time where no other is meant."""
-    if scene.general is not None or scene.replay is not None:
+    if not scene.is_lone_body:
         scene = first_part(scene, part)
-    if scene.general is not None:
+    if not scene.is_one_body:
         begin = scene.record.transient_time
         return Scales(scene.record.recorded_time, (begin, begin + scene.record.recorded_time))
     if scene.replay is not None:
@@ -147,7 +145,7 @@ def reference_of(scene: Scene) -> Reference:
     scene : Scene
         Without a sweep.
     """
-    if scene.general is not None:
+    if not scene.is_one_body:
         return _finest_exchange(scene)
     scales, integrated, best = scales_of(scene), _is_integrated(scene), best_of(scene)
     observation = observed(best)
@@ -210,8 +208,8 @@ def disturbed_keys(scene: Scene) -> list[str]:
     A body's own number changes more than the scale of the motion, which is all that the force does to a stop at 0.
     """
     found: list[str] = []
-    if scene.general is not None:
-        return _disturbed_parameters(scene.general)
+    if not scene.is_one_body:
+        return _disturbed_parameters(scene)
     for key in DISTURBED:
         with suppress(UsageError):  # a key that the scene does not have
             if scene.value(key) != 0.0:
@@ -219,10 +217,10 @@ def disturbed_keys(scene: Scene) -> list[str]:
     return found
 
 
-def _disturbed_parameters(general: GeneralScene) -> list[str]:
+def _disturbed_parameters(scene: Scene) -> list[str]:
     """Return the first number of each component that is not 0, in the order of the scene."""
     found = []
-    for component in general.components:
+    for component in scene.components:
         numbers = (
             n for n, value in component.parameters.items() if isinstance(value, float) and value != 0.0
         )
@@ -239,7 +237,7 @@ def disturbed_scenes(scene: Scene, count: int) -> list[Scene]:
 def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
     """Return a scene with one number slightly larger, or smaller where a body that starts on its stop forbids that."""
     number, change = scene.value(key), times * DISTURBANCE
-    if scene.general is not None:
+    if not scene.is_one_body:
         return scene.at({key: number * (1.0 + change)})
     try:
         return scene.with_values({key: number * (1.0 + change)})

@@ -135,7 +135,7 @@ def main() -> None:
             except SceneError:
                 print(f"  {path.name:24} (needs an FMU that is not there)")
                 continue
-            if scene.general is not None and scene.general.guard:
+            if not scene.is_one_body and scene.execution.guard:
                 print(f"  {path.name:24} (in a process of its own, where nobody counts)")
                 continue
             calls, size = counts_of(path, Path(folder))

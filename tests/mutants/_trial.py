@@ -113,7 +113,7 @@ def main() -> None:
     for path in sorted(EXAMPLES.rglob("*.toml")):
         try:
             scene = load_scene(path)
-            if scene.general is not None or scene.replay is not None or scene.run_count > 1000:
+            if not scene.is_lone_body or scene.run_count > 1000:
                 continue
             found = run_scene(scene, progress=False)
         except VibroimpactError as error:

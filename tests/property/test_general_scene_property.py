@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.scene.general.component_facts import component_facts
+from vibroimpact.orchestrator.scene.component_facts import component_facts
 
 LETTERS = string.ascii_letters + string.digits + "[]{}=.,_-+\"'#\\\n\r\t \x7f\u00e4\u20ac"
 values = st.recursive(

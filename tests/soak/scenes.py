@@ -127,7 +127,7 @@ def wrong_message(text: str) -> str | None:
 
 def run_shortly(scene: Scene) -> str | None:
     """Run the first point of a valid scene for a moment."""
-    if bytes_of_a_run(scene) > LARGEST_RUN or scene.general is not None or scene.replay is not None:
+    if bytes_of_a_run(scene) > LARGEST_RUN or not scene.is_lone_body:
         return None
     lines = [line for line in scene.text.splitlines() if not line.lstrip().startswith("deadline")]
     text = "\n".join(lines)

@@ -111,9 +111,8 @@ def _problem(path: Path, taken: Mapping[str, float], lost: Sequence[str], *, is_
         return None if told else f"refused: {refusal}"
     if is_doubled:
         return "two values of one parameter, and no word on it"
-    assert imported.scene.general is not None
     found: dict[str, float] = {}
-    for each in imported.scene.general.components:
+    for each in imported.scene.components:
         found |= {f"{each.name}.{key}": float(value) for key, value in each.parameters.items()}
     # names of components are those of their paths, with other signs for dots
     expected = {_plain(name): value for name, value in taken.items()}

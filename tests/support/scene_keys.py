@@ -9,10 +9,9 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from vibroimpact.orchestrator.scene import measuring_models, models, sweep_models
+from vibroimpact.orchestrator.scene import component_models, measuring_models, models, sweep_models
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
 from vibroimpact.orchestrator.scene.fields import bounds_of, choices_of, forms_of, numeric_keys, rule_of
-from vibroimpact.orchestrator.scene.general import models as general_models
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE
 from vibroimpact.orchestrator.scene.replay_models import Replay
 
@@ -37,12 +36,12 @@ SHORT: Tables = {
     "[record]": models.Record,
 }
 GENERAL: Tables = {
-    "[component.NAME]": general_models.ComponentTable,
-    "[[connection]]": general_models.ConnectionTable,
-    "[[event]]": general_models.EventTable,
-    "[[contact]] stop": general_models.StopContactTable,
-    **{f"[[contact]] between, law = {law}": model for law, model in general_models.PAIR_MODELS.items()},
-    "[record]": general_models.GeneralRecord,
+    "[component.NAME]": component_models.ComponentTable,
+    "[[connection]]": component_models.ConnectionTable,
+    "[[event]]": component_models.EventTable,
+    "[[contact]] stop": component_models.StopContactTable,
+    **{f"[[contact]] between, law = {law}": model for law, model in component_models.PAIR_MODELS.items()},
+    "[record]": component_models.GeneralRecord,
 }
 FORMS = {"both forms": BOTH, "short form": SHORT, "general form": GENERAL}
 

@@ -91,7 +91,7 @@ def converted_records(
         if record.samples is not None and len(record.samples):
             point = {key: float(column[place]) for key, column in values.items()}
             own = run_seed(seed, point, Direction(int(directions[place])))
-            names = scene.record.time_series.variables if scene.record.time_series else ()
+            names = scene.sampled
             record = replace(record, samples=converted(scene.at(point), record.samples, names, own))
         found.append(record)
     return found

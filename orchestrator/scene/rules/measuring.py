@@ -132,12 +132,7 @@ def noise_has_its_channel(draft: Draft) -> Iterator[Problem]:
 def one_clock_samples_the_channels(draft: Draft) -> Iterator[Problem]:
     """Channels are sampled by `[daq]` where there is one, one after the other within a sample."""
     series = draft.record.time_series if draft.record else None
-    if series is None:
-        return
-    if not draft.samples_channels:
-        if series.rate is None:
-            hint = "Add rate = ..., in samples per unit of time."
-            yield Problem("record.time_series.rate", "a number > 0", "nothing", hint)
+    if series is None or not draft.samples_channels:
         return
     rate, skew = (draft.span(f"daq.{name}") if draft.daq else None for name in ("rate", "skew"))
     if rate is None or skew is None:

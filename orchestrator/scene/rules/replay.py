@@ -30,8 +30,7 @@ def plain_variable(simulated: str) -> tuple[str, bool]:
 def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
     """A replay drives, compares, or both; what drives has a channel."""
     replay = draft.replay
-    if replay is None:
-        return
+    assert replay is not None  # these rules are asked of replays alone
     if replay.drive is None and not replay.compare:
         hint = 'Add drive = "base_acceleration" and from = "CHANNEL", or compare = [...].'
         yield Problem("replay", "something to drive or to compare", "neither", hint)
@@ -56,8 +55,9 @@ def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
 
 def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
     """Each simulated name is one that a time series of this scene could have; each pair is there once."""
-    if draft.replay is None or draft.body is None:
+    if draft.body is None:
         return
+    assert draft.replay is not None
     known = sampled_names(draft.body, len(draft.stops), draft.forcing)
     seen: set[tuple[str, str]] = set()
     for place, compared in enumerate(draft.replay.compare, start=1):
@@ -76,8 +76,6 @@ def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
 
 def no_record_beside_replay(draft: Draft) -> Iterator[Problem]:
     """The recording says how long a replay lasts."""
-    if draft.replay is None:
-        return
     for key in ("transient_periods", "recorded_periods", "transient_time", "recorded_time", "time_series"):
         if key in draft.written("record"):
             hint = "The recording says how long it lasts and at which rate; replay.start and stop cut it."

@@ -8,16 +8,14 @@ the worst corner holds everywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
-from vibroimpact.orchestrator.scene.keys import MODES, START_STATE
+from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES, MODES, START_STATE
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
-from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
-from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES
 from vibroimpact.orchestrator.scene.rules.stop import STOP_RULES
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
@@ -25,6 +23,7 @@ MOST_POINTS = 10**8
 PERIOD_KEYS = ("transient_periods", "recorded_periods")
 TIME_KEYS = ("transient_time", "recorded_time")
 COUPLING_KEYS = ("macro_step", "exchange", "guard")
+DraftRule = Callable[[Draft], Iterator[Problem]]
 
 
 def rule_problems(draft: Draft) -> list[Problem]:
@@ -36,14 +35,27 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _units_agree,
         *BODY_RULES,
         *STOP_RULES,
-        *MEASURING_RULES,
-        *REPLAY_RULES,
+        *_recording_rules(draft),
         _record_counts_what_there_is,
         _samples_fit,
-        _adaptive_axes_can_tell_motions,
+        *((_adaptive_axes_can_tell_motions,) if draft.axes else ()),
         _coupling_is_asked_for,
     )
-    return [problem for rule in rules for problem in rule(draft)] + list(sweep_problems(draft.axes))
+    problems = [problem for rule in rules for problem in rule(draft)]
+    return [*problems, *sweep_problems(draft.axes)] if draft.axes else problems
+
+
+def _recording_rules(draft: Draft) -> Iterator[DraftRule]:
+    """Yield the rules of a measuring chain, of a time series and of a replay; scenes without them load none."""
+    if draft.channels or not draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES)):
+        from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
+
+        yield from MEASURING_RULES
+    yield _time_series_has_a_rate
+    if draft.replay is not None:
+        from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES
+
+        yield from REPLAY_RULES
 
 
 def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
@@ -95,6 +107,13 @@ def _units_agree(draft: Draft) -> Iterator[Problem]:
     if draft.header and draft.header.units == "nondimensional" and "frequency" in draft.written("forcing"):
         hint = 'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".'
         yield Problem("forcing.frequency", "no frequency in Hz in a nondimensional scene", "one", hint)
+
+
+def _time_series_has_a_rate(draft: Draft) -> Iterator[Problem]:
+    series = draft.record.time_series if draft.record else None
+    if series is not None and series.rate is None and not draft.samples_channels:
+        hint = "Add rate = ..., in samples per unit of time."
+        yield Problem("record.time_series.rate", "a number > 0", "nothing", hint)
 
 
 def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:

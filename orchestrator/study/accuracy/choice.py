@@ -106,7 +106,7 @@ def advice(study: Comparison) -> str:
         begin, end = study.reference.scales.window
         part = (
             f"first {FIRST_IMPACTS} impacts or so"
-            if study.scene.general is None
+            if study.scene.is_one_body
             else f"first {end - begin:.3g} s"
         )
         words += f". The motion is chaotic: after its {part} only statistics compare"

@@ -158,6 +158,6 @@ class Comparison:
     @property
     def periods(self) -> float:
         """Forcing periods of the studied time; NaN where nothing forces it."""
-        if self.scene.general is not None or self.scene.replay is not None or self.scene.period is None:
+        if not self.scene.is_lone_body or self.scene.period is None:
             return math.nan
         return self.reference.scales.window[1] / self.scene.period

@@ -76,7 +76,7 @@ def within_reach(scene: Scene, budget: Budget) -> Scene:
     UsageError
         One forcing period takes too much; with the least budget.
     """
-    share = RECORDING_SHARE if scene.general is None else GENERAL_SHARE
+    share = RECORDING_SHARE if scene.is_one_body else GENERAL_SHARE
     for _ in range(MOST_HALVINGS):
         found = observed_within(_without_transient(scene), share * budget.seconds)
         if found.failure != LATE:
@@ -105,7 +105,7 @@ def transient_passed(scene: Scene, budget: Budget) -> Passed:
     UsageError
         The transient takes too much of the budget; with the least budget.
     """
-    if scene.general is not None or scene.replay is not None or not _has_transient(scene):
+    if not scene.is_lone_body or not _has_transient(scene):
         return Passed(scene, scene)
     trial = DrivenTrial(best_of(scene))
     try:
@@ -128,9 +128,8 @@ def transient_passed(scene: Scene, budget: Budget) -> Passed:
 
 def observed_within(scene: Scene, seconds: float) -> Observation:
     """Return the observation of a run that is given up after so much processor time, s: fused where that can be."""
-    is_short = scene.general is None and scene.replay is None
     trial: Trial = (
-        DrivenTrial(best_of(scene)) if is_short else opened_trial(limited_elsewhere(scene, seconds))
+        DrivenTrial(best_of(scene)) if scene.is_lone_body else opened_trial(limited_elsewhere(scene, seconds))
     )
     try:
         with clock.CLOCK.limited(seconds):
@@ -141,7 +140,7 @@ def observed_within(scene: Scene, seconds: float) -> Observation:
 
 def limited_elsewhere(scene: Scene, seconds: float) -> Scene:
     """Return a scene whose runs in another process, where it asks for one, are given up after some wall time, s."""
-    is_guarded = scene.is_guarded
+    is_guarded = scene.execution.guard
     if not is_guarded:
         return scene
     own, most = scene.execution.deadline, max(LEAST_GUARDED, seconds)
@@ -153,7 +152,7 @@ def _has_transient(scene: Scene) -> bool:
 
 
 def _without_transient(scene: Scene) -> Scene:
-    if scene.general is not None or scene.replay is not None or not _has_transient(scene):
+    if not scene.is_lone_body or not _has_transient(scene):
         return scene
     return scene.with_values(_no_transient(scene))
 

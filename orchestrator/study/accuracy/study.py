@@ -249,7 +249,7 @@ def studied_scene(scene: Scene) -> Scene:
         The scene has an exciter whose force is not its forcing alone.
     """
     alone = scene.unswept()
-    if scene.general is not None or scene.replay is not None:
+    if not scene.is_lone_body:
         return alone
     alone = motion_alone(alone)
     if alone.record.time_series is not None:
@@ -266,7 +266,7 @@ def _orbit_of(reference: Reference, whole: Scene, passed: Passed) -> str:
     """
     if reference.chaotic:
         return "chaotic"
-    if whole.general is not None or whole.replay is not None:
+    if not whole.is_lone_body:
         return ""
     found = reference.observation
     if passed.observation is not None:
@@ -291,7 +291,7 @@ def first_impacts(scene: Scene, spends: Budget) -> Scene:
 
     It ends earlier where a run takes too much of the budget, as one of rare impacts does.
     """
-    if scene.general is not None:
+    if not scene.is_one_body:
         return _comparable(scene)
     if scene.period is None:
         return scene

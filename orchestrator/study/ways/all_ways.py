@@ -12,7 +12,6 @@ from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, RestitutionStop
 from vibroimpact.orchestrator.study.ways.models import other_models, other_modes
 from vibroimpact.orchestrator.study.ways.plain_steps import PlainForcesTrial, PlainStepsTrial
@@ -59,7 +58,7 @@ def ways_of(
     whole : Scene, optional
         The scene with its transient, where `scene` begins after it: other models pass one of their own.
     """
-    if scene.general is not None:
+    if not scene.is_one_body:
         return _general_ways(scene)
     if scene.replay is not None:
         return [*_fused(scene), *_coupled_replay(scene), *_fewer_samples(scene), *other_modes(scene)]
@@ -77,12 +76,12 @@ def ways_of(
 def remarks_on(scene: Scene) -> list[str]:
     """Return what the study of a scene leaves out, and why."""
     remarks = []
-    if scene.general is not None and (fixed := _not_repeated(scene.general)):
+    if fixed := _not_repeated(scene):
         remarks.append(
             f"iterated exchange with {', '.join(fixed)}: steps cannot be repeated, since the FMU does not restore its "
             "state; it is stepped once, last, with the newest values, in each of the exchanges"
         )
-    plain = scene.general is None and scene.replay is None and scene.stops
+    plain = scene.is_lone_body and scene.stops
     if plain:
         remarks += _remarks_on_strangers(scene)
     rigid = any(isinstance(stop, RestitutionStop) for stop in scene.stops)
@@ -91,7 +90,7 @@ def remarks_on(scene: Scene) -> list[str]:
             "stops of other laws: the mass that hits a stop is that of the modes, and with it restitution depends on "
             "their number"
         )
-    if scene.general is None and isinstance(scene.body, BeamBody) and rigid:
+    if rigid and isinstance(scene.body, BeamBody):
         remarks.append(
             "number of modes: nothing converges, since the contact mass of a rigid stop on a beam falls with the "
             "number of modes and its restitution has no meaning without it (docs/contact_laws.md); compliant stops do"
@@ -255,8 +254,7 @@ def _integrated(scene: Scene) -> list[Way]:
 
 
 def _general_ways(scene: Scene) -> list[Way]:
-    assert scene.general is not None
-    own = scene.general.macro_step
+    own = scene.macro_step
     return [
         way_by_scene(
             f"coupled, {exchange}",
@@ -270,12 +268,12 @@ def _general_ways(scene: Scene) -> list[Way]:
     ]
 
 
-def _not_repeated(general: GeneralScene) -> list[str]:
+def _not_repeated(scene: Scene) -> list[str]:
     """Return the components that take values of others and do not restore their states."""
-    targets = {connection.target[0] for connection in general.connections}
+    targets = {connection.target[0] for connection in scene.connections}
     return [
         one.name
-        for one in general.components
+        for one in scene.components
         if one.name in targets and not description_of(one.fmu).coSimulation.canGetAndSetFMUstate
     ]
 

@@ -65,7 +65,7 @@ def halved(scene: Scene) -> Scene | None:
 
     A general scene and a replay are halved from their start.
     """
-    if scene.general is not None or scene.replay is not None:
+    if not scene.is_lone_body:
         return first_part(scene, 0.5)
     if scene.period is None:
         return scene.with_values({"record.recorded_time": 0.5 * scene.record.recorded_time})

@@ -81,7 +81,7 @@ class SceneTrial:
 
     def __init__(self, scene: Scene, wrap: Wrapper | None = None) -> None:
         of = None if wrap is None else (lambda name: wrap)
-        self.is_guarded = scene.is_guarded
+        self.is_guarded = scene.execution.guard
         self._runner = open_runner(scene, scene.execution.how, wrap=of)
 
     def run(self) -> Observation:
@@ -118,7 +118,7 @@ def opened_part(scene: Scene, part: float, wrap: Wrapper | None = None) -> Trial
     """Open a scene as it says itself, to simulate the first part of its time."""
     if part == 1.0:
         return opened_trial(scene, wrap)
-    if scene.general is not None or scene.replay is not None:
+    if not scene.is_lone_body:
         return opened_trial(first_part(scene, part), wrap)
     return DrivenTrial(scene, part, wrap)
 

@@ -16,7 +16,7 @@ from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.fmus.errors import DatasetError, SceneError
-from vibroimpact.orchestrator.scene.resting_start import with_resting_start
+from vibroimpact.orchestrator.scene.changes import with_resting_start
 
 
 def in_this_process(arguments: list[str]) -> tuple[int, str, str]:

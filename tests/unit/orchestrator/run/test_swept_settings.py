@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.replay.fit import fit_keys
 from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.run.parameters import padded_state, without_padding
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.text import text_with_values
+from vibroimpact.orchestrator.scene.changes import text_with_values
 
 BEAM = """
 [body]

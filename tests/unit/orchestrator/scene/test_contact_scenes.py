@@ -76,11 +76,10 @@ def problems_of(folder: Path, text: str) -> list[str]:
 
 
 def test_a_contact_is_what_the_importer_is_asked(folder: Path) -> None:
-    general = scene_of(folder, CONTACT).general
-    assert general is not None
-    assert general.contacts == (StopContactSpec("mass", "x", "v", "f", "stop", 1.0),)
-    assert general.contacts[0].name == "stop.applied_force -> mass.f"
-    assert general.contacts[0].connections == (
+    scene = scene_of(folder, CONTACT)
+    assert scene.contacts == (StopContactSpec("mass", "x", "v", "f", "stop", 1.0),)
+    assert scene.contacts[0].name == "stop.applied_force -> mass.f"
+    assert scene.contacts[0].connections == (
         ConnectionSpec(("mass", "x"), ("stop", "displacement")),
         ConnectionSpec(("mass", "v"), ("stop", "velocity")),
     )
@@ -91,10 +90,9 @@ def test_a_contact_is_what_the_importer_is_asked(folder: Path) -> None:
 def test_the_mass_of_a_contact_is_swept(folder: Path) -> None:
     sweep = '[sweep]\n"contact[1].mass" = { values = [0.97, 1.0] }\n[record]'
     scene = scene_of(folder, CONTACT.replace("[record]", sweep).replace("mass = 1.0\n", ""))
-    assert scene.general is not None
-    assert scene.general.value("contact[1].mass") == 0.97
-    assert scene.general.at({"contact[1].mass": 1.0}).contacts[0].mass == 1.0
-    assert scene.general.units["contact[1].mass"] == "kg"
+    assert scene.value("contact[1].mass") == 0.97
+    assert scene.at({"contact[1].mass": 1.0}).contacts[0].mass == 1.0
+    assert scene.declared_units["contact[1].mass"] == "kg"
     runner = GeneralRunner(scene)
     steps = []
     for mass in (0.97, 1.0):
@@ -103,7 +101,7 @@ def test_the_mass_of_a_contact_is_swept(folder: Path) -> None:
     runner.close()
     assert steps == [0.97, 1.0]
     with pytest.raises(UsageError, match=r"contact\[2\]\.mass: expected a number of a contact"):
-        scene.general.value("contact[2].mass")
+        scene.value("contact[2].mass")
 
 
 MISTAKES = [
@@ -177,7 +175,7 @@ def test_a_body_that_cannot_go_back_meets_no_rigid_stop(folder: Path, law: str) 
 
 def test_a_body_that_cannot_go_back_says_its_mass(folder: Path) -> None:
     text = CONTACT.replace("Mass.fmi3", "StatelessMass.fmi3")
-    assert scene_of(folder, text).general is not None
+    assert not scene_of(folder, text).is_one_body
     (problem,) = problems_of(folder, text.replace("mass = 1.0\n", ""))
     assert problem == (
         "contact[1].mass: expected the effective mass, a number > 0, got nothing. "

@@ -15,6 +15,7 @@ from vibroimpact.fmus.units import agree, si_unit
 from vibroimpact.orchestrator.scene import (
     Scene,
     body_models,
+    component_models,
     measuring_models,
     models,
     parse_scene,
@@ -22,14 +23,13 @@ from vibroimpact.orchestrator.scene import (
     sweep_models,
 )
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody, Rayleigh
+from vibroimpact.orchestrator.scene.component_facts import component_facts
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_keys, rule_of
-from vibroimpact.orchestrator.scene.general import models as general_models
-from vibroimpact.orchestrator.scene.general.component_facts import component_facts
 
 REFERENCE = ROOT / "docs" / "scene.md"
 MODELS = {
     found
-    for module in (models, body_models, measuring_models, replay_models, sweep_models, general_models)
+    for module in (models, body_models, measuring_models, replay_models, sweep_models, component_models)
     for found in vars(module).values()
     if isinstance(found, type) and issubclass(found, BaseModel) and found.model_fields
 }

@@ -22,8 +22,7 @@ from vibroimpact.orchestrator.campaign.manifest import flat_scene, scene_hash
 from vibroimpact.orchestrator.importer import specification
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
-from vibroimpact.orchestrator.scene.general.component_facts import component_facts
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+from vibroimpact.orchestrator.scene.component_facts import component_facts
 from vibroimpact.orchestrator.scene.sweep import expand
 
 UNITS = """
@@ -88,11 +87,6 @@ def ball(tmp_path: Path) -> Callable[[str], Scene]:
     return lambda text: parse_scene(text, str(tmp_path / "s.toml"))
 
 
-def general_of(scene: Scene) -> GeneralScene:
-    assert scene.general is not None
-    return scene.general
-
-
 def coupled(old: str, new: str) -> str:
     assert old in COUPLED
     return COUPLED.replace(old, new)
@@ -108,27 +102,26 @@ def ball_problems(folder: Path, *lines: str) -> list[str]:
 
 def test_a_general_scene_is_what_the_importer_is_asked() -> None:
     scene = parse_scene(COUPLED, "s.toml")
-    general = general_of(scene)
-    assert general.components == (
+    assert scene.components == (
         ComponentSpec("a", fmu_path("Oscillator").absolute(), {"mass": 2.0, "contact[1].law": 1}),
         ComponentSpec("b", fmu_path("Oscillator", "2.0").absolute(), {}),
     )
-    assert general.connections == (ConnectionSpec(("b", "displacement"), ("a", "force"), 0.5, "N/m"),)
-    assert (general.events, general.variables, general.rate) == ((), (), None)
-    assert (general.macro_step, general.exchange, general.guard) == (0.1, "gauss_seidel", False)
+    assert scene.connections == (ConnectionSpec(("b", "displacement"), ("a", "force"), 0.5, "N/m"),)
+    assert (scene.events, scene.sampled, scene.sampling_rate) == ((), (), 0.0)
+    assert (scene.macro_step, scene.execution.exchange, scene.execution.guard) == (0.1, "gauss_seidel", False)
     assert (scene.record.transient_time, scene.record.recorded_time, scene.record.impacts) == (1.0, 2.0, True)
     assert (scene.forcing, scene.stops, scene.period, scene.execution.how) == (None, (), None, "auto")
 
 
 def test_start_values_have_the_type_of_their_variable() -> None:
-    parameters = general_of(parse_scene(COUPLED, "s.toml")).components[0].parameters
+    parameters = parse_scene(COUPLED, "s.toml").components[0].parameters
     assert type(parameters["mass"]) is float
     assert type(parameters["contact[1].law"]) is int
 
 
 def test_a_scene_of_the_short_form_is_not_a_general_one() -> None:
     scene = parse_scene("[body]\nmass = 1\nstiffness = 1\n[record]\nrecorded_time = 5", "s.toml")
-    assert scene.general is None
+    assert scene.is_one_body
 
 
 def test_a_general_scene_has_no_body() -> None:
@@ -140,41 +133,44 @@ def test_fmu_paths_count_from_the_folder_of_the_scene(tmp_path: Path) -> None:
     (tmp_path / "fmus").mkdir()
     file = write_fmu(tmp_path / "fmus" / "ball.fmu")
     (tmp_path / "s.toml").write_text(FREE_BALL.replace("ball.fmu", "fmus/ball.fmu"))
-    general = general_of(load_scene(tmp_path / "s.toml"))
-    assert general.components[0].fmu == file
+    scene = load_scene(tmp_path / "s.toml")
+    assert scene.components[0].fmu == file
     absolute = parse_scene(FREE_BALL.replace("ball.fmu", str(file)), "s.toml")
-    assert general_of(absolute).components[0].fmu == file
+    assert absolute.components[0].fmu == file
 
 
 def test_foreign_code_is_guarded_unless_the_scene_says_otherwise(ball: Callable[[str], Scene]) -> None:
-    assert general_of(ball(FREE_BALL)).guard
-    assert not general_of(ball(FREE_BALL + "[execution]\nguard = false")).guard
-    assert general_of(parse_scene(COUPLED + "guard = true", "s.toml")).guard
+    assert ball(FREE_BALL).execution.guard
+    assert not ball(FREE_BALL + "[execution]\nguard = false").execution.guard
+    assert parse_scene(COUPLED + "guard = true", "s.toml").execution.guard
 
 
 def test_one_component_alone_steps_over_the_whole_run(ball: Callable[[str], Scene]) -> None:
-    assert general_of(ball(FREE_BALL + "transient_time = 2.0")).macro_step == 5.0
+    assert ball(FREE_BALL + "transient_time = 2.0").macro_step == 5.0
 
 
 def test_events_and_recorded_variables_are_named_by_component(ball: Callable[[str], Scene]) -> None:
     text = FREE_BALL + 'variables = ["ball.h", "ball.up", "ball.v"]\nrate = 200\nevents = false\n'
     scene = ball(text + '[[event]]\nwatch = "ball.h"\ndirection = "falling"\nlevel = 0.5')
-    general = general_of(scene)
-    assert general.events == (EventSpec("ball", "h", "falling", 0.5),)
-    assert (general.variables, general.rate) == (("ball.h", "ball.up", "ball.v"), 200.0)
-    assert dict(general.units) == {"ball.h": "m", "ball.up": "1", "ball.v": "m/s"}
+    assert scene.events == (EventSpec("ball", "h", "falling", 0.5),)
+    assert (scene.sampled, scene.sampling_rate) == (("ball.h", "ball.up", "ball.v"), 200.0)
+    assert {name: scene.declared_units[name] for name in scene.sampled} == {
+        "ball.h": "m",
+        "ball.up": "1",
+        "ball.v": "m/s",
+    }
     assert not scene.record.impacts
 
 
 def test_a_start_state_is_a_start_value_though_it_is_an_output(ball: Callable[[str], Scene]) -> None:
     scene = ball(FREE_BALL.replace("[record]", "parameters = { h = 2 }\n[record]"))
-    assert general_of(scene).components[0].parameters == {"h": 2.0}
+    assert scene.components[0].parameters == {"h": 2.0}
 
 
 def test_units_agree_by_meaning_and_a_missing_one_agrees_with_all(ball: Callable[[str], Scene]) -> None:
     ends = [("h", "in"), ("h", "in_length"), ("v", "in_bare"), ("up", "hold")]
     text = "".join(f'[[connection]]\nfrom = "ball.{a}"\nto = "ball.{b}"\n' for a, b in ends)
-    assert len(general_of(ball(FREE_BALL + text + "[execution]\nmacro_step = 1")).connections) == 4
+    assert len(ball(FREE_BALL + text + "[execution]\nmacro_step = 1").connections) == 4
 
 
 def test_the_short_form_does_not_load_what_reads_descriptions() -> None:
@@ -206,18 +202,18 @@ def test_any_start_value_and_any_gain_is_swept() -> None:
     assert keys == ["a.stiffness", "b.stiffness", "connection[1].gain", "b.contact[2].law"]
     names = [scene.sweep_coordinate_name(key) for key in keys]
     assert names == ["a_stiffness", "b_stiffness", "gain", "law"]
-    assert [general_of(scene).units[key] for key in keys] == ["N/m", "N/m", "N/m", "1"]
+    assert [scene.declared_units[key] for key in keys] == ["N/m", "N/m", "N/m", "1"]
     assert len(expand(scene)[0].points) == 12
 
 
 def test_each_point_of_a_sweep_has_its_own_values() -> None:
     scene = parse_scene(SWEPT, "s.toml")
     last = list(expand(scene)[0].points)[-1]
-    general = general_of(scene.at(last.values))
-    assert general.components[0].parameters["stiffness"] == 4.0
-    assert general.components[0].parameters["mass"] == 2.0
-    assert general.connections[0].gain == 1.0
-    law = general.components[1].parameters["contact[2].law"]
+    scene = scene.at(last.values)
+    assert scene.components[0].parameters["stiffness"] == 4.0
+    assert scene.components[0].parameters["mass"] == 2.0
+    assert scene.connections[0].gain == 1.0
+    law = scene.components[1].parameters["contact[2].law"]
     assert (law, type(law)) == (5, int)
     back = {key: scene.value(key) for key in last.values}
     assert scene.at(last.values).at(back) == scene
@@ -523,14 +519,14 @@ def test_the_bouncing_ball_example_takes_a_ball_that_the_user_fetches(tmp_path: 
         load_scene(scene)
     write_fmu(tmp_path / "BouncingBall.fmu")
     loaded = load_scene(scene)
-    assert general_of(loaded).events == (EventSpec("ball", "v", "rising", 0.0),)
+    assert loaded.events == (EventSpec("ball", "v", "rising", 0.0),)
     assert [axis.key for axis in loaded.sweep] == ["ball.e"]
 
 
 def test_the_mixed_example_joins_two_versions_of_fmi() -> None:
-    general = general_of(load_scene(ROOT / "examples" / "mixed_versions.toml"))
-    assert [component.fmu.parent.name for component in general.components] == ["fmi3", "fmi2"]
-    assert general.components[0].parameters["contact[1].law"] == 5
+    scene = load_scene(ROOT / "examples" / "mixed_versions.toml")
+    assert [component.fmu.parent.name for component in scene.components] == ["fmi3", "fmi2"]
+    assert scene.components[0].parameters["contact[1].law"] == 5
 
 
 def test_a_nondimensional_scene_connects_plain_numbers() -> None:
@@ -539,16 +535,14 @@ def test_a_nondimensional_scene_connects_plain_numbers() -> None:
     with pytest.raises(SceneError, match="the same unit at both ends, got m"):
         parse_scene(text, "c.toml")
     scene = parse_scene('[scene]\nunits = "nondimensional"\n' + text, "c.toml")
-    assert scene.general is not None
-    assert scene.general.connections[0].gain == 0.5
+    assert scene.connections[0].gain == 0.5
     with_unit = parse_scene('[scene]\nunits = "nondimensional"\n' + COUPLED, "c.toml")
-    assert with_unit.general is not None
-    assert with_unit.general.connections[0].gain == 0.5
+    assert with_unit.connections[0].gain == 0.5
     at_once = text.replace("b.displacement", "b.velocity")
-    assert parse_scene('[scene]\nunits = "nondimensional"\n' + at_once, "c.toml").general is not None
+    assert parse_scene('[scene]\nunits = "nondimensional"\n' + at_once, "c.toml").connections
 
 
 @pytest.mark.parametrize("name", ["oscillator", "OSCILLATOR", "Oscil lator", "o-s-c-i-l-l-a-t-o-r"])
 def test_a_shipped_component_is_known_in_any_spelling(name: str) -> None:
     scene, spelled = (parse_scene(each, "c.toml") for each in (COUPLED, COUPLED.replace("Oscillator", name)))
-    assert spelled.general == scene.general
+    assert spelled.components == scene.components

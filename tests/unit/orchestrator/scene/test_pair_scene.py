@@ -14,7 +14,6 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 
 SCENE = """
 [component.a]
@@ -41,10 +40,8 @@ macro_step = 0.1
 """
 
 
-def general(text: str) -> GeneralScene:
-    found = parse_scene(text, "pairs.toml").general
-    assert found is not None
-    return found
+def scene_of(text: str) -> Scene:
+    return parse_scene(text, "pairs.toml")
 
 
 def problem_of(text: str) -> str:
@@ -55,7 +52,7 @@ def problem_of(text: str) -> str:
 
 
 def test_points_take_the_free_ports_and_one_point_takes_one() -> None:
-    scene = general(SCENE)
+    scene = scene_of(SCENE)
     assert scene.pairs == (
         PairSpec(("a", "contact[1]"), ("c", "contact[2]"), 0.0, "restitution", 0.5),
         PairSpec(("c", "contact[2]"), ("b", "contact[1]"), 0.5, "hunt_crossley", stiffness=1e4),
@@ -69,16 +66,16 @@ def test_points_take_the_free_ports_and_one_point_takes_one() -> None:
 def test_a_port_may_be_given_with_its_place() -> None:
     text = SCENE.replace('"b.tip"', '"b.contact[3]"')
     text = text.replace("mass_per_length = 1.0", 'mass_per_length = 1.0, "contact[3].location" = 0.7')
-    scene = general(text)
+    scene = scene_of(text)
     assert scene.pairs[1].upper == ("b", "contact[3]")
     assert scene.components[1].parameters["contact[3].law"] == 7
 
 
 def test_the_numbers_of_a_pair_are_swept_and_have_units() -> None:
     sweep = '[sweep]\n"contact[1].restitution" = { values = [0.2, 0.9] }\n"contact[2].clearance" = { values = [0.1] }\n'
-    scene = general(SCENE + sweep)
-    assert scene.units["contact[2].clearance"] == "m"
-    assert scene.start_units["contact[2].stiffness"] == "N/m^exponent"
+    scene = scene_of(SCENE + sweep)
+    assert scene.declared_units["contact[2].clearance"] == "m"
+    assert scene.declared_units["contact[2].stiffness"] == "N/m^exponent"
     assert scene.value("contact[1].restitution") == 0.5
     other = scene.at({"contact[1].restitution": 0.9, "contact[2].clearance": 0.1})
     assert (other.pairs[0].restitution, other.pairs[1].clearance) == (0.9, 0.1)
@@ -245,8 +242,7 @@ def test_rigid_impacts_of_bodies_of_other_tools_travel_as_a_system(tmp_path: Pat
 def test_a_body_of_another_tool_is_hit_where_the_law_yields(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(FOREIGN.format(fmu=mass(tmp_path, "3.0").name))
     scene = load_scene(tmp_path / "s.toml")
-    assert scene.general is not None
-    (pair,) = scene.general.pairs
+    (pair,) = scene.pairs
     assert pair.lower == ("tip", "contact[1]")
     assert pair.upper == BodyPoint("ball", "x", "v", "f", 1.0)
     assert pair.name == "tip.contact[1] - ball.x"

@@ -6,7 +6,7 @@ import tomllib
 
 import pytest
 
-from vibroimpact.orchestrator.scene.text import text_with_values
+from vibroimpact.orchestrator.scene.changes import text_with_values
 
 
 @pytest.mark.parametrize(

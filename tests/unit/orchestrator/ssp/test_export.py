@@ -109,10 +109,9 @@ def test_what_is_swept_is_one_parameter_set_of_the_system_mapped_to_its_componen
             if name == "resources/system.sweep.ssv":
                 content = content.replace(b'"2.0"', b'"7.0"').replace(b'"0.25"', b'"0.75"')
             new.writestr(name, content)
-    general = load_system(changed).scene.general
-    assert general is not None
-    assert {c.name: c for c in general.components}["b"].parameters["mass"] == 7.0
-    assert general.connections[0].gain == (0.75 if springs else 0.25)
+    scene = load_system(changed).scene
+    assert {c.name: c for c in scene.components}["b"].parameters["mass"] == 7.0
+    assert scene.connections[0].gain == (0.75 if springs else 0.25)
 
 
 def test_copies_of_the_swept_set_are_a_sweep_and_one_of_them_is_a_point(system: Path, tmp_path: Path) -> None:
@@ -128,9 +127,8 @@ def test_copies_of_the_swept_set_are_a_sweep_and_one_of_them_is_a_point(system: 
     swept = {axis.key: list(axis.values) for axis in load_system(system, (), sets).scene.sweep}
     assert swept == {**gains, "b.mass": [3.0, 5.0]}
     one = load_system(system, (), sets[-1:]).scene
-    assert one.general is not None
-    assert one.general.components[1].parameters["mass"] == 5.0
-    assert one.general.connections[0].gain == (0.75 if springs else 0.25)
+    assert one.components[1].parameters["mass"] == 5.0
+    assert one.connections[0].gain == (0.75 if springs else 0.25)
     # what the set gives is swept no more; a gain that is no component is in no set
     assert [axis.key for axis in one.sweep] == ([] if springs else ["connection[1].gain"])
 
@@ -192,9 +190,8 @@ def test_one_file_travels_once_and_names_stay_apart_where_case_does_not_count(tm
         "resources/Gain.fmu",
         "resources/gain_2.fmu",
     ]
-    general = load_system(path).scene.general
-    assert general is not None
-    assert [c.fmu.name for c in general.components] == ["Gain.fmu", "gain_2.fmu", "Gain.fmu"]
+    scene = load_system(path).scene
+    assert [c.fmu.name for c in scene.components] == ["Gain.fmu", "gain_2.fmu", "Gain.fmu"]
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.packaging.description import UnitDefinition
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import export_system, import_system, load_system, opened_scene
 
 MILLIMETRE = UnitDefinition("mm", {"m": 1}, 1e-3)
@@ -48,10 +48,8 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
 
 
-def read(folder: Path, fmus: dict[str, Path], description: str) -> GeneralScene:
-    scene = load_system(archive(folder / "system.ssp", description, fmus)).scene
-    assert scene.general is not None
-    return scene.general
+def read(folder: Path, fmus: dict[str, Path], description: str) -> Scene:
+    return load_system(archive(folder / "system.ssp", description, fmus)).scene
 
 
 def body(bindings: str = "", name: str = "body") -> str:
@@ -152,19 +150,16 @@ def test_a_connected_parameter_takes_the_value_of_its_connection_and_the_other_i
     )
     path = archive(tmp_path / "s.ssp", description, fmus)
     imported = load_system(path)
-    assert imported.scene.general is not None
-    assert imported.scene.general.components[0].parameters["mass"] == 30.0
+    assert imported.scene.components[0].parameters["mass"] == 30.0
     said = [note for note in imported.notes if "of its connection" in note]
     assert "body.mass: 30.0 of its connection was taken, not 10.0 of a parameter set" in said
     other = tmp_path / "set.ssv"
     other.write_text(ssv({"body.mass": real(40.0)}))
     again = load_system(path, parameters=[other])
-    assert again.scene.general is not None
-    assert again.scene.general.components[0].parameters["mass"] == 30.0
+    assert again.scene.components[0].parameters["mass"] == 30.0
     other.write_text(ssv({"heaviness": real(50.0)}))
     again = load_system(path, parameters=[other])
-    assert again.scene.general is not None
-    assert again.scene.general.components[0].parameters["mass"] == 50.0
+    assert again.scene.components[0].parameters["mass"] == 50.0
 
 
 def test_types_fit_their_variables_and_what_no_variable_takes_is_noted(
@@ -177,10 +172,9 @@ def test_types_fit_their_variables_and_what_no_variable_takes_is_noted(
         "velocity": real(1.0),
     }
     imported = load_system(archive(tmp_path / "my rig.ssp", ssd(body(values(given))), fmus))
-    assert imported.scene.general is not None
-    assert dict(imported.scene.general.components[0].parameters) == {"mass": 4.0, "contact[1].law": 1}
+    assert dict(imported.scene.components[0].parameters) == {"mass": 4.0, "contact[1].law": 1}
     # what a run says of the FMU names the system, wherever it lies unpacked
-    assert imported.scene.general.components[0].fmu.parts[-2:] == ("my_rig_fmus", "body.fmu")
+    assert imported.scene.components[0].fmu.parts[-2:] == ("my_rig_fmus", "body.fmu")
     (left_out, recorded) = imported.notes
     assert "body.no such, body.velocity" in left_out
     assert "record.variables" in recorded
@@ -212,9 +206,8 @@ def test_files_of_values_and_types_of_ssp_2_are_read(tmp_path: Path, fmus: dict[
     path = archive(
         tmp_path / "s.ssp", ssd(local, version="2.0"), {**fmus, "resources/body.ssv": written.encode()}
     )
-    general = load_system(path).scene.general
-    assert general is not None
-    assert general.components[0].parameters["mass"] == 2.5
+    scene = load_system(path).scene
+    assert scene.components[0].parameters["mass"] == 2.5
 
 
 def test_a_system_without_an_end_or_a_step_says_which_keys_to_give(
@@ -224,8 +217,7 @@ def test_a_system_without_an_end_or_a_step_says_which_keys_to_give(
     with pytest.raises(SceneError, match=r"s\.ssp: .*stopTime: expected .*--set record\.recorded_time=10"):
         load_system(path)
     scene = load_system(path, ["record.recorded_time=4.0"]).scene
-    assert scene.general is not None
-    assert (scene.record.recorded_time, scene.general.rate) == (4.0, 250.0)
+    assert (scene.record.recorded_time, scene.sampling_rate) == (4.0, 250.0)
     for wrong, told in (("long", '"long"'), ("1" + "0" * 400, "a number near 1e400")):
         with pytest.raises(SceneError, match=f"recorded_time: expected .*got {told}"):
             load_system(path, [f"record.recorded_time={wrong}"])
@@ -246,8 +238,7 @@ def test_the_step_is_that_of_the_master_or_the_smallest_that_an_fmu_proposes(
     general = read(tmp_path, fmus, outer)
     assert (general.macro_step, len(general.connections)) == (0.0625, 1)
     imported = load_system(archive(tmp_path / "t.ssp", ssd(elements, joined, step=None), fmus))
-    assert imported.scene.general is not None
-    assert 0.0 < imported.scene.general.macro_step < 1.0
+    assert 0.0 < imported.scene.macro_step < 1.0
     assert "execution.macro_step" in imported.notes[0]
 
 
@@ -263,9 +254,8 @@ def test_parameter_sets_are_the_points_of_a_sweep(tmp_path: Path, fmus: dict[str
         "body.stiffness": (4.0, 9.0),
     }
     one = load_system(path, (), sets[1:2]).scene
-    assert one.general is not None
     assert one.sweep == ()
-    assert one.general.components[0].parameters["mass"] == 2.0
+    assert one.components[0].parameters["mass"] == 2.0
     with pytest.raises(UsageError, match="all combinations of several"):
         load_system(path, (), sets[:3])
     same = tmp_path / "same.ssv"
@@ -307,8 +297,7 @@ def test_what_another_tool_has_changed_in_an_archive_of_ours_counts(
 ) -> None:
     path = export_system(vi.Scene.from_file(scene_of_two(tmp_path)), tmp_path / "two.ssp")
     heavier = ssv({"displacement_start": real(1.0), "mass": real(5.0)})
-    again = load_system(changed(path, tmp_path / "m.ssp", "resources/a.ssv", heavier.encode())).scene.general
-    assert again is not None
+    again = load_system(changed(path, tmp_path / "m.ssp", "resources/a.ssv", heavier.encode())).scene
     assert again.components[0].parameters == {"displacement_start": 1.0, "mass": 5.0}
     # another FMU in the place of ours is the one that runs
     gain = fmus["resources/plain.fmu"].read_bytes()

@@ -184,9 +184,8 @@ def test_a_component_is_taken_away_with_all_that_joins_it_and_the_others_are_com
     stop_the_clock(monkeypatch)
     scene = load_scene(EXAMPLES / "two_oscillators.toml", ["record.recorded_time=20"])
     effect = next(one for one in effects_of(scene) if one.name == "component b")
-    assert effect.without.general is not None
-    assert [one.name for one in effect.without.general.components] == ["a"]
-    assert not effect.without.general.connections
+    assert [one.name for one in effect.without.components] == ["a"]
+    assert not effect.without.connections
     (share,) = shares_of(scene, [effect])
     # alone a goes on as cos sqrt(1.1) t; coupled it is half of cos t + cos sqrt(1.2) t
     time, (slow, fast, alone) = np.arange(0.0, 20.0, 0.05), np.sqrt([1.0, 1.2, 1.1])

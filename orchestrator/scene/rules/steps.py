@@ -11,9 +11,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from vibroimpact.orchestrator.fmi.capabilities import INTERNAL_STEP, VARIABLE_STEPS
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
-from vibroimpact.orchestrator.scene.general.scene import STEP_KEY, component_variable
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts
+from vibroimpact.orchestrator.scene.component_models import BodyPair, StopContactTable
+from vibroimpact.orchestrator.scene.component_numbers import STEP_KEY, component_variable
+from vibroimpact.orchestrator.scene.components import GeneralDraft
 from vibroimpact.orchestrator.scene.problems import Problem, key_path
 
 #: Largest distance of a ratio from a whole number, relative, that rounding explains: instants agree to 1e-13.
@@ -134,12 +135,9 @@ def _clock_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:
 
 def _contact_problems(draft: GeneralDraft, limited: dict[str, ComponentFacts]) -> Iterator[Problem]:
     """Steps end where bodies touch, and the mass of a body is measured in short ones."""
-    for place in range(len(draft.contacts)):
-        table = draft.contact(place)
-        if table is None:
-            continue
-        for name, facts in limited.items():
-            if facts.capabilities.variable_steps and name not in _members(draft, place):
+    for place, table in enumerate(draft.contacts):
+        for name, facts in limited.items() if table is not None else ():
+            if facts.capabilities.variable_steps and name not in _members(table):
                 continue  # on its own grid, beside a contact of others
             got = f"{facts.file} ({facts.capabilities.grid})"
             hint = "A contact ends steps where bodies touch, and tries short ones."
@@ -147,12 +145,11 @@ def _contact_problems(draft: GeneralDraft, limited: dict[str, ComponentFacts]) -
             yield Problem(key_path(("contact", place)), expected, got, hint)
 
 
-def _members(draft: GeneralDraft, place: int) -> set[str]:
+def _members(table: StopContactTable | BodyPair | None) -> set[str]:
     """Return the components that take part in a contact."""
-    table, pair = draft.contacts[place], draft.pairs[place]
-    if table is not None:
+    if isinstance(table, StopContactTable):
         return {table.body, table.stop}
-    return {component_variable(point)[0] for point in pair.between} if pair is not None else set()
+    return {component_variable(point)[0] for point in table.between} if table is not None else set()
 
 
 def _event_problems(draft: GeneralDraft, limited: dict[str, ComponentFacts]) -> Iterator[Problem]:

@@ -10,13 +10,12 @@ from functools import partial
 from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.units import parse_unit
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
-from vibroimpact.orchestrator.scene.general.components import DraftComponent
-from vibroimpact.orchestrator.scene.general.contact_rules import variable_problems
-from vibroimpact.orchestrator.scene.general.models import BodyPair, BodyPointTable
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
-from vibroimpact.orchestrator.scene.general.scene import component_variable
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.component_models import BodyPair, BodyPointTable, PairTable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable
+from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.contacts import variable_problems
 
 #: The law of a port that watches no stop of its own.
 PAIR_LAW = "pair"
@@ -31,14 +30,7 @@ _LAST, _TIP = 0, 1.0
 class PortPlan:
     """Which contact port, or point, each end of each pair takes, and what its component must be given for that.
 
-    Attributes
-    ----------
-    ends : mapping of (place, end) to (component, port) or BodyPoint
-        By the 0-based place of the `[[contact]]` and of the point in its `between`.
-    parameters : mapping of str to mapping
-        Start values by component.
-    problems : list of Problem
-        Everything that is wrong.
+    Ends go by the 0-based place of the `[[contact]]` and of the point in its `between`, start values by component.
     """
 
     ends: dict[tuple[int, int], tuple[str, str] | BodyPoint] = field(default_factory=dict)
@@ -55,8 +47,8 @@ def plan_ports(draft: GeneralDraft) -> PortPlan:
     """Find a contact port for each point that another body may hit."""
     plan = PortPlan()
     taken: dict[tuple[str, str], str] = {}
-    for place, table in enumerate(draft.pairs):
-        if table is None:
+    for place, table in enumerate(draft.contacts):
+        if not isinstance(table, PairTable):
             continue
         names = [component_variable(point)[0] for point in table.between]
         where = key_path(("contact", place, "between"))
@@ -110,14 +102,8 @@ def _foreign_point_problems(
         compared = None if draft.is_nondimensional else unit
         yield from variable_problems(where, name, facts, getattr(point, key), causality, compared)
     if not facts.restorable:
-        got = f"{facts.file}, which does not have canGetAndSetFMUState"
         hint = "The instant at which two bodies meet is found by going back."
-        yield Problem(
-            key_path(("contact", place, "bodies", name)),
-            "an FMU whose state can be kept and restored",
-            got,
-            hint,
-        )
+        yield not_restorable(facts, key_path(("contact", place, "bodies", name)), hint)
     for number, connection in enumerate(draft.connections, start=1):
         if connection is not None and component_variable(connection.target) == (name, point.force):
             where = key_path(("contact", place, "bodies", name, "force"))
@@ -226,7 +212,7 @@ def _free_port(draft: GeneralDraft, component: DraftComponent, rest: str, plan: 
         if all(parameters.get(name) == value for name, value in wanted.items()):
             return port
     swept = draft.document.get("sweep")
-    named = [point for table in draft.pairs if table for point in table.between]
+    named = [point for table in draft.contacts if isinstance(table, PairTable) for point in table.between]
     used = {
         *parameters,
         *plan.parameters.get(component.name, {}),

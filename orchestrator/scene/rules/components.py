@@ -6,10 +6,8 @@ said of the variables of an FMU that cannot be read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 from vibroimpact.fmus.units import (
     Unit,
@@ -18,127 +16,25 @@ from vibroimpact.fmus.units import (
     parse_unit,
     product_agrees,
 )
-from vibroimpact.orchestrator.scene.draft import DraftTables
-from vibroimpact.orchestrator.scene.fields import rule_of
-from vibroimpact.orchestrator.scene.general.component_facts import (
+from vibroimpact.orchestrator.scene.component_facts import (
     NUMERIC_KINDS,
-    ComponentFacts,
     VariableFacts,
 )
-from vibroimpact.orchestrator.scene.general.components import components_of
-from vibroimpact.orchestrator.scene.general.models import (
-    PAIR_MODELS,
-    BodyPair,
+from vibroimpact.orchestrator.scene.component_models import (
     ConnectionTable,
-    EventTable,
-    GeneralRecord,
-    PairTable,
-    StopContactTable,
 )
-from vibroimpact.orchestrator.scene.general.scene import (
-    STEP_KEY,
+from vibroimpact.orchestrator.scene.component_numbers import (
     component_variable,
-    contact_key,
-    gain_place,
 )
+from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.keys import dataset_name
-from vibroimpact.orchestrator.scene.models import Execution
-from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sample_problems
 
 MOST_STEPS_PER_RUN = 10**10
 #: Inputs of a body's contact port by which another component answers its contact.
 ANSWERS = ("applied_restitution", "applied_force")
-#: Keys of a contact of a body with a stop, of which one with another body has none.
-_STOP_CONTACT_KEYS = frozenset(StopContactTable.model_fields) - frozenset(PairTable.model_fields)
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
-
-
-class GeneralDraft(DraftTables):
-    """A general scene on its way.
-
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document.
-    folder : Path
-        The folder of the scene file, from which FMU paths count.
-    """
-
-    def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
-        super().__init__(document)
-        self.components = components_of(document.get("component"), folder, self.problems)
-        self.connections = tuple(self.read(ConnectionTable, *entry) for entry in self.entries("connection"))
-        self.events = tuple(self.read(EventTable, *entry) for entry in self.entries("event"))
-        contacts = [self._contact(*entry) for entry in self.entries("contact")]
-        self.contacts = tuple(table if isinstance(table, StopContactTable) else None for table in contacts)
-        self.pairs = tuple(table if isinstance(table, PairTable) else None for table in contacts)
-        self.record = self.table(GeneralRecord, "record", {})
-        self.execution = self.table(Execution, "execution", {})
-
-    def _contact(self, raw: object, path: KeyPath) -> StopContactTable | BodyPair | None:
-        """Read a contact of either form; of a mixture of both nothing else is said."""
-        keys = set(raw) if isinstance(raw, dict) else {"stop"}
-        one, other = "between" in keys, keys & _STOP_CONTACT_KEYS
-        if one == bool(other):
-            expected = (
-                "either between = [...], two bodies that hit each other, or body, stop and their variables"
-            )
-            got = f"between beside {', '.join(sorted(other))}" if one else "neither"
-            self.problems.append(Problem(key_path(path), expected, got, "Write one [[contact]] for each."))
-            return None
-        if one:
-            return self.variant(PAIR_MODELS, "law", "restitution", raw, path)
-        return self.read(StopContactTable, raw, path)
-
-    @property
-    def is_nondimensional(self) -> bool:
-        """Whether all numbers of the scene are without units, whatever its FMUs declare."""
-        return self.header is not None and self.header.units == "nondimensional"
-
-    def facts(self, reference: str) -> ComponentFacts | None:
-        """Return the facts of the component that a reference names; None when they are not known."""
-        component = self.components.get(component_variable(reference)[0])
-        return component.facts if component else None
-
-    def variable(self, reference: str) -> VariableFacts | None:
-        """Return the variable that `COMPONENT.VARIABLE` names; None when it is not known."""
-        facts = self.facts(reference)
-        return facts.variables.get(component_variable(reference)[1]) if facts else None
-
-    def unit(self, key: str) -> str:
-        """Return the unit of a variable, gain or contact's number as it is written where it is declared; else `1`."""
-        if self.names_step(key):
-            return "s"
-        named = contact_key(key)
-        if named is not None and "contact" not in self.components:
-            return self._contact_unit(*named)
-        variable, place = self.variable(key), gain_place(key)
-        connection = self.connections[place] if place is not None and variable is None else None
-        return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
-
-    def names_step(self, key: str) -> bool:
-        """Whether a key is the step of the exchange, and no variable of a component of that name."""
-        return key == STEP_KEY and "execution" not in self.components
-
-    def swept_steps(self) -> tuple[float, ...]:
-        """Return the numbers that a sweep gives the step of the exchange, as far as they are numbers."""
-        entry = self.written("sweep").get(STEP_KEY) if self.names_step(STEP_KEY) else None
-        given = entry if isinstance(entry, dict) else {}
-        values = given.get("values", [given.get("start"), given.get("stop")])
-        numbers = values if isinstance(values, list) else []
-        return tuple(v for v in numbers if isinstance(v, int | float) and v > 0.0)
-
-    def _contact_unit(self, place: int, name: str) -> str:
-        """Unit of a number of a contact, with dots between its factors as the descriptions of FMUs write it."""
-        table = self.contact(place)
-        known = {} if table is None else type(table).model_fields
-        return (rule_of(known[name]).unit if name in known else "").replace(" ", ".") or "1"
-
-    def contact(self, place: int) -> StopContactTable | BodyPair | None:
-        """Return the contact at a 0-based place; None where it is not valid."""
-        found = self.contacts[place] or self.pairs[place] if place < len(self.contacts) else None
-        return found
 
 
 def general_problems(draft: GeneralDraft) -> list[Problem]:
@@ -288,8 +184,7 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
             yield Problem(where, "a continuous real number", got, "A crossing needs values on both sides.")
         if not facts.restorable:
             hint = "A crossing is found by going back to the state before the step."
-            got = f"{facts.file}, which does not have canGetAndSetFMUState"
-            yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+            yield not_restorable(facts, where, hint)
         force = _contact_answer(draft, component_variable(event.watch)[0])
         if facts.event_mode and force is not None:
             hint = (

@@ -1,4 +1,4 @@
-"""Which effects of the short form a scene of components calls for: by its shipped components and their numbers."""
+"""Which effects a scene calls for, at one of its points at least: by its numbers, or by its components."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Iterator
 
 from vibroimpact.fmus.shipped import package_folder
 from vibroimpact.orchestrator.importer.specification import ComponentSpec
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable
+from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION
+from vibroimpact.orchestrator.scene.parts import Parts
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
-from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 STRUCTURES = ("Chain", "Beam")
 """Bodies that follow their energies only where these are asked for."""
@@ -41,31 +43,32 @@ _WHOLE = {
 """Components that are an effect by themselves."""
 
 
-def called_by_components(general: GeneralScene, axes: tuple[SweepAxis, ...]) -> set[str]:
-    """Return the effects that the components of a scene call for, at one point of its sweep at least.
+def called_by_numbers(scene: Parts) -> set[str]:
+    """Return the effects that numbers other than 0 call for."""
+    return {rule_of(scene.field(key)).effect for key, largest in _largest(scene).items() if largest > 0.0}
 
-    Parameters
-    ----------
-    general : GeneralScene
-    axes : tuple of SweepAxis
 
-    Returns
-    -------
-    set of str
-        FMUs of other tools call for none that is known.
-    """
-    swept = {axis.key: max(map(abs, axis.values)) for axis in axes}
+def _largest(scene: Parts) -> dict[str, float]:
+    """Return the largest magnitude that each number of a scene has over its sweep, by key."""
+    numbers = [axis for axis in scene.sweep if axis.key != RECORDING_KEY]
+    swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in numbers}
+    return {key: abs(number) for key, number in scene.constants().items()} | swept
+
+
+def called_by_components(scene: Parts) -> set[str]:
+    """Return the effects that the components of a scene call for, at one point of its sweep at least."""
+    swept = {axis.key: max(map(abs, axis.values)) for axis in scene.sweep}
     found: set[str] = set()
-    for component in general.components:
+    for component in scene.components:
         kind = shipped_kind(component)
         found |= {_WHOLE[kind]} if kind in _WHOLE else set()
         patterns = _OF_A_BODY if kind in BODIES else _OF_OTHERS.get(kind, {})
         given = [name for name, value in _numbers(component, swept) if value]
         found |= {effect for effect, key in patterns.items() if any(map(key.fullmatch, given))}
-    if any(pair.numbers.get("yield_velocity") for pair in general.pairs):
+    if any(pair.numbers.get("yield_velocity") for pair in scene.pairs):
         found.add(FALLING_RESTITUTION)
-    kinds = {component.name: shipped_kind(component) for component in general.components}
-    sampled = map(component_variable, general.variables)
+    kinds = {component.name: shipped_kind(component) for component in scene.components}
+    sampled = map(component_variable, scene.sampled)
     if follow_energies(name for owner, name in sampled if kinds.get(owner) in STRUCTURES):
         found.add("energies")
     return found

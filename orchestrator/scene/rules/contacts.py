@@ -7,10 +7,10 @@ from functools import partial
 
 from vibroimpact.fmus.core.contact_laws import contact_law, rigid_law_numbers
 from vibroimpact.fmus.units import Unit, agree, parse_unit
-from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, VariableFacts
-from vibroimpact.orchestrator.scene.general.models import StopContactTable
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
-from vibroimpact.orchestrator.scene.general.scene import component_variable, mass_place
+from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, VariableFacts
+from vibroimpact.orchestrator.scene.component_models import StopContactTable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable, contact_key
+from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 
 #: Variables of a stop that say which law it follows, on which side it is.
@@ -25,7 +25,7 @@ def contact_problems(draft: GeneralDraft) -> list[Problem]:
     return [
         problem
         for place, table in enumerate(draft.contacts)
-        if table is not None
+        if isinstance(table, StopContactTable)
         for rule in rules
         for problem in rule(draft, place, table)
     ]
@@ -114,8 +114,7 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
             "A stop is asked for its force along the way of the body. Use an ImpactStop, or connect this one by "
             "[[connection]] with a small macro_step."
         )
-        got = f"{facts.file}, which does not have canGetAndSetFMUState"
-        yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+        yield not_restorable(facts, where, hint)
     body = _facts(draft, table.body)
     if body is not None and not body.restorable and _is_rigid(draft, table, facts):
         hint = (
@@ -163,7 +162,7 @@ def _bodies_say_their_mass(draft: GeneralDraft, place: int, table: StopContactTa
 
 def _sweeps_mass(draft: GeneralDraft, place: int) -> bool:
     swept = draft.document.get("sweep")
-    return isinstance(swept, dict) and any(mass_place(key) == place for key in swept)
+    return isinstance(swept, dict) and any(contact_key(key) == (place, "mass") for key in swept)
 
 
 def _inputs_are_free(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
@@ -178,7 +177,7 @@ def _inputs_are_free(draft: GeneralDraft, place: int, table: StopContactTable) -
             where = key_path(("contact", place, key))
             yield Problem(where, "an input that the contact alone feeds", got, "Remove the connection.")
     for number, other in enumerate(draft.contacts[:place], start=1):
-        if other is not None and other.stop == table.stop:
+        if isinstance(other, StopContactTable) and other.stop == table.stop:
             got = f"{quoted(table.stop)}, which contact[{number}] has already"
             hint = "Make a component for each contact."
             yield Problem(key_path(("contact", place, "stop")), "a stop of its own", got, hint)

@@ -15,7 +15,7 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
-from vibroimpact.orchestrator.scene.general.component_facts import (
+from vibroimpact.orchestrator.scene.component_facts import (
     ComponentFacts,
     Misfit,
     StartValue,
@@ -23,31 +23,33 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
     component_facts,
     typed_value,
 )
-from vibroimpact.orchestrator.scene.general.models import ComponentTable
-from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted, read_table
+from vibroimpact.orchestrator.scene.component_models import (
+    PAIR_MODELS,
+    BodyPair,
+    ComponentTable,
+    ConnectionTable,
+    EventTable,
+    GeneralRecord,
+    PairTable,
+    StopContactTable,
+)
+from vibroimpact.orchestrator.scene.component_numbers import (
+    STEP_KEY,
+    component_variable,
+    contact_key,
+    gain_place,
+)
+from vibroimpact.orchestrator.scene.draft import DraftTables
+from vibroimpact.orchestrator.scene.fields import rule_of
+from vibroimpact.orchestrator.scene.models import Execution
+from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, nearest, quoted, read_table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
 class DraftComponent:
-    """A component on its way; `facts` is None where its FMU cannot be read, and then nothing is said of it.
-
-    Attributes
-    ----------
-    name : str
-        Its name in the scene.
-    fmu : Path or None
-        Its FMU file.
-    shipped : bool
-        Whether it is one of this package.
-    facts : ComponentFacts or None
-        What its description says.
-    parameters : mapping of str to StartValue
-        The valid ones of its start values.
-    tolerance : float or None
-        Relative tolerance that its FMU is set up with; None: the FMU's own.
-    """
+    """A component on its way, with its valid start values; of one whose FMU cannot be read there are no facts."""
 
     name: str
     fmu: Path | None = None
@@ -58,17 +60,7 @@ class DraftComponent:
 
 
 def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
-    """Return the components of a document by name; what is wrong with them joins the problems.
-
-    Parameters
-    ----------
-    raw : object
-        What the document has under `component`.
-    folder : Path
-        The folder of the scene file, from which FMU paths count.
-    problems : list of Problem
-        Grows.
-    """
+    """Return the components of a document by name; what is wrong with them joins the problems."""
     if not isinstance(raw, dict) or not raw:
         got = "nothing" if raw in (None, {}) else quoted(raw)
         hint = 'Write [component.ball] and below it fmu = "ball.fmu".'
@@ -250,6 +242,12 @@ def start_problems(variable: VariableFacts, where: str) -> Iterator[Problem]:
         yield Problem(where, "a number, true or false, or text", _described(variable))
 
 
+def not_restorable(facts: ComponentFacts, where: str, hint: str) -> Problem:
+    """Return the problem of an FMU that has to go back to a state, and cannot."""
+    got = f"{facts.file}, which does not have canGetAndSetFMUState"
+    return Problem(where, "an FMU whose state can be kept and restored", got, hint)
+
+
 def settable_names(facts: ComponentFacts) -> list[str]:
     """Return the names of the variables of an FMU that have a start value."""
     return [name for name, variable in facts.variables.items() if variable.settable]
@@ -258,3 +256,79 @@ def settable_names(facts: ComponentFacts) -> list[str]:
 def _described(variable: VariableFacts) -> str:
     constant = "constant " if variable.variability == "constant" else ""
     return f"the {constant}{variable.causality} {variable.name} ({variable.shape})"
+
+
+#: Keys of a contact of a body with a stop, of which one with another body has none.
+_STOP_CONTACT_KEYS = frozenset(StopContactTable.model_fields) - frozenset(PairTable.model_fields)
+
+
+class GeneralDraft(DraftTables):
+    """A general scene on its way."""
+
+    def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
+        super().__init__(document)
+        self.components = components_of(document.get("component"), folder, self.problems)
+        self.connections = tuple(self.read(ConnectionTable, *entry) for entry in self.entries("connection"))
+        self.events = tuple(self.read(EventTable, *entry) for entry in self.entries("event"))
+        self.contacts = tuple(self._contact(*entry) for entry in self.entries("contact"))
+        self.record = self.table(GeneralRecord, "record", {})
+        self.execution = self.table(Execution, "execution", {})
+
+    def _contact(self, raw: object, path: KeyPath) -> StopContactTable | BodyPair | None:
+        """Read a contact of either form; of a mixture of both nothing else is said."""
+        keys = set(raw) if isinstance(raw, dict) else {"stop"}
+        one, other = "between" in keys, keys & _STOP_CONTACT_KEYS
+        if one == bool(other):
+            expected = (
+                "either between = [...], two bodies that hit each other, or body, stop and their variables"
+            )
+            got = f"between beside {', '.join(sorted(other))}" if one else "neither"
+            self.problems.append(Problem(key_path(path), expected, got, "Write one [[contact]] for each."))
+            return None
+        if one:
+            return self.variant(PAIR_MODELS, "law", "restitution", raw, path)
+        return self.read(StopContactTable, raw, path)
+
+    @property
+    def is_nondimensional(self) -> bool:
+        """Whether all numbers of the scene are without units, whatever its FMUs declare."""
+        return self.header is not None and self.header.units == "nondimensional"
+
+    def facts(self, reference: str) -> ComponentFacts | None:
+        """Return the facts of the component that a reference names; None when they are not known."""
+        component = self.components.get(component_variable(reference)[0])
+        return component.facts if component else None
+
+    def variable(self, reference: str) -> VariableFacts | None:
+        """Return the variable that `COMPONENT.VARIABLE` names; None when it is not known."""
+        facts = self.facts(reference)
+        return facts.variables.get(component_variable(reference)[1]) if facts else None
+
+    def unit(self, key: str) -> str:
+        """Return the unit of a variable, gain or contact's number as it is written where it is declared; else `1`."""
+        if self.names_step(key):
+            return "s"
+        named = contact_key(key)
+        if named is not None and "contact" not in self.components:
+            return self._contact_unit(*named)
+        variable, place = self.variable(key), gain_place(key)
+        connection = self.connections[place] if place is not None and variable is None else None
+        return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
+
+    def names_step(self, key: str) -> bool:
+        """Whether a key is the step of the exchange, and no variable of a component of that name."""
+        return key == STEP_KEY and "execution" not in self.components
+
+    def swept_steps(self) -> tuple[float, ...]:
+        """Return the numbers that a sweep gives the step of the exchange, as far as they are numbers."""
+        entry = self.written("sweep").get(STEP_KEY) if self.names_step(STEP_KEY) else None
+        given = entry if isinstance(entry, dict) else {}
+        values = given.get("values", [given.get("start"), given.get("stop")])
+        numbers = values if isinstance(values, list) else []
+        return tuple(v for v in numbers if isinstance(v, int | float) and v > 0.0)
+
+    def _contact_unit(self, place: int, name: str) -> str:
+        """Unit of a number of a contact, with dots between its factors as the descriptions of FMUs write it."""
+        table = self.contacts[place] if place < len(self.contacts) else None
+        known = {} if table is None else type(table).model_fields
+        return (rule_of(known[name]).unit if name in known else "").replace(" ", ".") or "1"

@@ -1,1 +1,0 @@
-"""Scenes of `[component.NAME]` tables: any FMUs, their connections and events."""

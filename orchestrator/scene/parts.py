@@ -1,0 +1,321 @@
+"""The parts of a scene, whichever form its file has: bodies, what they meet, what drives them, what is recorded.
+
+A file with `[body]` has one body of the package, which meets its own stops; one with `[component.NAME]` has a body for
+each FMU, connections between them and contacts of any two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from itertools import chain
+from pathlib import Path
+from typing import Any, Literal, Self, cast
+
+from pydantic import BaseModel, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic.fields import FieldInfo
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.importer.specification import (
+    ComponentSpec,
+    ConnectionSpec,
+    EventSpec,
+    PairSpec,
+    StopContactSpec,
+)
+from vibroimpact.orchestrator.scene.body_models import Body
+from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, is_step
+from vibroimpact.orchestrator.scene.fields import field_of, known_keys
+from vibroimpact.orchestrator.scene.keys import (
+    SINGLE_TABLES,
+    Key,
+    number_of,
+    numbers_of,
+    numeric_key,
+    replacement,
+)
+from vibroimpact.orchestrator.scene.measuring_models import (
+    Daq,
+    Exciter,
+    LoadCell,
+    Noise,
+    Sensor,
+)
+from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
+from vibroimpact.orchestrator.scene.sampled_names import channels_in
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
+
+_NAMED_BY_FORM = ("bodies", "contacts", "connections", "events", "declared_units", "doubts", "remarks")
+"""Parts that documents of the two forms name differently, or not at all."""
+
+
+class Parts(SceneTable):
+    """What a scene consists of, and the questions about it."""
+
+    source: str
+    title: str
+    units: Literal["SI", "nondimensional"]
+    bodies: tuple[Body | ComponentSpec, ...]
+    contacts: tuple[Stop | StopContactSpec | PairSpec, ...] = ()
+    connections: tuple[ConnectionSpec, ...] = ()
+    events: tuple[EventSpec, ...] = ()
+    forcing: Forcing | None = None
+    sensor: Sensor | None = None
+    load_cell: LoadCell | None = None
+    exciter: Exciter | None = None
+    noise: Noise | None = None
+    daq: Daq | None = None
+    record: Record
+    sweep: tuple[SweepAxis, ...]
+    execution: Execution
+    replay: Replay | None = None
+    declared_units: Mapping[str, str] = Field(default_factory=dict, repr=False)
+    doubts: tuple[str, ...] = Field((), repr=False)
+    remarks: Mapping[str, int] = Field(default_factory=dict, repr=False)
+
+    @model_serializer(mode="wrap")
+    def _by_form(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return the document by which campaigns know a scene: the parts under the names that each form had first."""
+        document: dict[str, Any] = serialized(self)
+        parts = {name: document.pop(name, None) for name in _NAMED_BY_FORM}
+        if self.is_one_body:
+            return document | {"body": parts["bodies"][0], "stops": parts["contacts"], "general": None}
+        document["record"]["time_series"] = None
+        return document | {"body": None, "stops": [], "general": self._components_document()}
+
+    def _components_document(self) -> dict[str, Any]:
+        """Return what a campaign knows of components: folders of FMU files are left out, wherever a scene lies."""
+        series = self.record.time_series
+        components = [asdict(component) for component in self.components]
+        for component in components:
+            component["fmu"] = component["fmu"].name
+        swept = (axis.key for axis in self.sweep)
+        document = {
+            "components": components,
+            "connections": [asdict(connection) for connection in self.connections],
+            "events": [asdict(event) for event in self.events],
+            "variables": self.sampled,
+            "rate": None if series is None else series.rate,
+            "macro_step": self.macro_step,
+            "exchange": self.execution.exchange,
+            "guard": self.execution.guard,
+            "units": {key: self.declared_units[key] for key in (*self.sampled, *swept)},
+            "doubts": self.doubts,
+            "remarks": dict(self.remarks),
+        }
+        if self.contacts:  # campaigns from before there were any go on
+            document["contacts"] = [asdict(contact) for contact in self.meetings]
+        return document
+
+    # ---- questions about the parts ----
+
+    @property
+    def is_one_body(self) -> bool:
+        """Whether what moves is one body of the package with its own stops; else it is components, of any FMUs."""
+        return not isinstance(self.bodies[0], ComponentSpec)
+
+    @property
+    def is_lone_body(self) -> bool:
+        """Whether what moves is one body and no recording has a part in it: its start, force and time are its own."""
+        return self.replay is None and self.is_one_body
+
+    @property
+    def body(self) -> Body:
+        """The body of a scene of one.
+
+        Raises
+        ------
+        UsageError
+            For a scene of components.
+        """
+        if not self.is_one_body:
+            raise UsageError(f"{self.source}: body: expected a scene with [body], got a general scene.")
+        return cast(Body, self.bodies[0])
+
+    @property
+    def components(self) -> tuple[ComponentSpec, ...]:
+        """The components; none in a scene of one body."""
+        return () if self.is_one_body else cast(tuple[ComponentSpec, ...], self.bodies)
+
+    @property
+    def stops(self) -> tuple[Stop, ...]:
+        """The stops of the body; none in a scene of components."""
+        return cast(tuple[Stop, ...], self.contacts) if self.is_one_body else ()
+
+    @property
+    def meetings(self) -> tuple[StopContactSpec | PairSpec, ...]:
+        """Which components meet; none in a scene of one body."""
+        return () if self.is_one_body else cast(tuple[StopContactSpec | PairSpec, ...], self.contacts)
+
+    @property
+    def stop_contacts(self) -> tuple[StopContactSpec, ...]:
+        """Components that meet stops which are components too."""
+        return tuple(contact for contact in self.contacts if isinstance(contact, StopContactSpec))
+
+    @property
+    def pairs(self) -> tuple[PairSpec, ...]:
+        """Components that hit each other."""
+        return tuple(contact for contact in self.contacts if isinstance(contact, PairSpec))
+
+    @property
+    def period(self) -> float | None:
+        """Forcing period 2 pi / angular_frequency; None unforced and under a constant force."""
+        if self.forcing is None or self.forcing.angular_frequency == 0.0:
+            return None
+        return 2.0 * math.pi / self.forcing.angular_frequency
+
+    @property
+    def macro_step(self) -> float:
+        """Time between two exchanges of components, s: as given, the first that is swept, or the whole run."""
+        swept = next((axis.values[0] for axis in self.sweep if is_step(self.components, axis.key)), None)
+        whole = self.record.transient_time + self.record.recorded_time
+        return self.execution.macro_step or swept or whole
+
+    @property
+    def sampling_rate(self) -> float:
+        """Nominal rate of the time series, 1/s: that of `[daq]` where it samples channels; 0 without a time series."""
+        series = self.record.time_series
+        if series is None:
+            return 0.0
+        return self.daq.rate if self.daq is not None and self.channels else series.rate or 0.0
+
+    @property
+    def sampled(self) -> tuple[str, ...]:
+        """The variables of the time series, in its order; none without one."""
+        return () if self.record.time_series is None else self.record.time_series.variables
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of the measuring chain that the time series samples, in its order."""
+        return channels_in(self.sampled) if self.is_one_body else ()
+
+    @property
+    def falling_force(self) -> bool:
+        """Whether the force of the exciter falls with the distance: at one point of the sweep, then held at all."""
+        if self.exciter is None:
+            return False
+        swept = [axis.values for axis in self.sweep if axis.key == "exciter.distance"]
+        return self.exciter.distance > 0.0 or any(map(any, swept))
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether its runs go by blocks of samples; no other run pays for a measuring chain."""
+        return bool(self.channels) or self.falling_force
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files beside its own that a run of it reads: recordings that drive it, FMUs."""
+        folder = Path(self.source).parent
+        recordings = self.replay.recordings if self.replay is not None else ()
+        return (*(folder / name for name in recordings), *(component.fmu for component in self.components))
+
+    @property
+    def runs(self) -> int:
+        """How many runs the sweep has; 1 without one."""
+        return run_count(self.sweep)
+
+    # ---- numbers by their keys ----
+
+    def value(self, key: str) -> float:
+        """Return the number that a key such as `stop[1].position` or `ball.e` has in this scene.
+
+        Raises
+        ------
+        UsageError
+            When the scene has no such number.
+        """
+        if not self.is_one_body:
+            return self._component_numbers().value(key)
+        parts = numeric_key(key)
+        return self._number(key, parts, self._numbered_tables().get(parts.owner))
+
+    def field(self, key: str) -> FieldInfo:
+        """Return the field of the model that a numeric key of the short form names; `fields` reads it.
+
+        Raises
+        ------
+        UsageError
+            When the scene has no such key.
+        """
+        parts = numeric_key(key)
+        owner = self._numbered_tables().get(parts.owner)
+        if owner is None or parts.name not in known_keys(type(owner)):
+            raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent one.")
+        return field_of(type(owner), parts.name)
+
+    def _number(self, key: str, parts: Key, owner: BaseModel | None) -> float:
+        number = number_of(owner, parts)
+        if number is None:
+            raise UsageError(f"{self.source}: {key}: expected a number of this scene, got nothing.")
+        return number
+
+    def at(self, values: Mapping[str, float]) -> Self:
+        """Return this scene at a point of its sweep: with other numbers, not validated again, and the text it has.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            New values of sweepable keys. Values of the scene's own sweep are known to be valid; others are for
+            `with_values`. An angular_frequency replaces a frequency that the scene gives, and a damping its
+            damping_ratio; and the other way round.
+
+        Examples
+        --------
+        >>> from vibroimpact.orchestrator.scene import Scene
+        >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
+        >>> Scene.from_text(text).at({"body.mass": 2.0}).body.mass
+        2.0
+        """
+        if not self.is_one_body:
+            return self._of_components_at(values)
+        tables = self._numbered_tables()
+        for key, value in values.items():
+            if key == RECORDING_KEY:  # which recording is replayed: no number of any table
+                continue
+            parts = numeric_key(key)
+            owner = tables.get(parts.owner)
+            if owner is None:
+                raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
+            if parts.element is not None:
+                self._number(key, parts, owner)
+            tables[parts.owner] = owner.model_copy(update=replacement(owner, parts, value))
+        others = {name: tables.pop(name) for name in (*SINGLE_TABLES, "execution")}
+        bodies = (others.pop("body"),)
+        return self.model_copy(update={**others, "bodies": bodies, "contacts": tuple(tables.values())})
+
+    def _of_components_at(self, values: Mapping[str, float]) -> Self:
+        new = self._component_numbers().at(values)
+        parts: dict[str, Any] = {
+            "bodies": new.components,
+            "connections": new.connections,
+            "contacts": new.contacts,
+        }
+        if new.macro_step != self.macro_step:
+            parts["execution"] = self.execution.model_copy(update={"macro_step": new.macro_step})
+        return self.model_copy(update=parts)
+
+    def constants(self) -> dict[str, float]:
+        """Return the numbers of what moves that a sweep could vary and this one does not, by key, defaults too."""
+        swept = {axis.key for axis in self.sweep}
+        return {key: value for key, value in self.numbers() if key not in swept}
+
+    def _component_numbers(self) -> ComponentNumbers:
+        return ComponentNumbers(self.components, self.connections, self.meetings, self.macro_step)
+
+    def numbers(self) -> Iterator[tuple[str, float]]:
+        """Yield each number of what moves that a sweep could vary, with its key."""
+        if not self.is_one_body:
+            return self._component_numbers().numbers()
+        tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
+        return chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
+
+    def _numbered_tables(self) -> dict[str, BaseModel | None]:
+        """Return the tables that hold numbers, as keys name them."""
+        stops: dict[str, BaseModel | None] = {
+            f"stop[{n}]": stop for n, stop in enumerate(self.stops, start=1)
+        }
+        tables = {name: getattr(self, name) for name in SINGLE_TABLES if name != "body"}
+        body = {"body": self.body} if self.is_one_body else {}
+        return {**stops, **body, **tables, "execution": self.execution}
