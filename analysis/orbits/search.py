@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import (
     SAME,
     TURN,
@@ -14,6 +13,7 @@ from vibroimpact.analysis.orbits.periodic import (
     closed_form,
     find_orbit,
 )
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 

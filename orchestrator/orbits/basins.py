@@ -20,7 +20,7 @@ from vibroimpact.analysis.orbits.basins import (
     border_share,
     find_basins,
 )
-from vibroimpact.analysis.orbits.body import ImpactingBody
+from vibroimpact.fmus.bodies.impacting_body import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow, start_names

@@ -12,7 +12,6 @@ import xarray as xr
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import UnitSystem
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.energies import (
     OrbitEnergies,
     energy_transfer,
@@ -21,6 +20,7 @@ from vibroimpact.analysis.orbits.energies import (
 )
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.orbits.runs import (
     Bodies,

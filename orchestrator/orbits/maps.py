@@ -12,10 +12,10 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.grazing_sets import grazing_sets
 from vibroimpact.analysis.orbits.normal_forms import Nordmark, grazing_family, square_root_diagram
 from vibroimpact.analysis.orbits.periodic import TURN
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import find_orbits

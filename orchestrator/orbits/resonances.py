@@ -11,9 +11,9 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.energies import energies

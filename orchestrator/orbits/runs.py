@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.schema import Outcome, UnitSystem
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.recorded import Impacts
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.dataset import coordinate_names
