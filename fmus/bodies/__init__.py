@@ -12,11 +12,4 @@ POINTS_OF_FMU: dict[str, type[BodyPoints]] = {
     "Beam": BeamPoints,
 }
 
-__all__ = [
-    "POINTS_OF_FMU",
-    "BodyPoints",
-    "Columns",
-    "Contact",
-    "ImpactingBody",
-    "ModalPoints",
-]
+__all__ = ["POINTS_OF_FMU", "BodyPoints", "Columns", "Contact", "ImpactingBody", "ModalPoints"]

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.bodies.impacting_body import Contact, Floats, ImpactingBody
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, Integers, Numbers
 
-Integers = Mapping[str, int]
-Numbers = Mapping[str, float]
 Columns = Mapping[str, Floats]
-
-DIRECTIONS = {1: 1.0, 2: -1.0}
-"""Direction of a stop by the number of its side: 1 is above, 2 below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,33 +63,23 @@ class ModalPoints:
         return found
 
 
+@dataclass(frozen=True)
 class BodyPoints(ABC):
-    """A body at the points of a sweep.
+    """A body at the points of a sweep, or at one point.
 
-    Parameters
+    Attributes
     ----------
-    floats : mapping of str to ndarray, shape (point,)
-        Real parameters of the body's FMU, SI.
+    floats : mapping of str to ndarray, shape (point,), or to float
+        Real parameters of the body's FMU, SI. Of arrays there are `in_state_coordinates`, of numbers the others.
     integers : mapping of str to int
         Integer parameters, which all points have in common.
-
-    Notes
-    -----
-    A kind of body implements the methods that raise no modes here: its motion in the coordinates of its state, in
-    mass-normalised modes, and what keeps it from having such modes.
+    stops : int
+        Number of contact ports with a stop.
     """
 
-    def __init__(self, floats: Columns, integers: Integers) -> None:
-        self.floats, self.integers = floats, integers
-
-    @cached_property
-    def contacts(self) -> int:
-        """Number of contact ports that have a stop."""
-        return sum(name.startswith("contact[") and name.endswith("].law") for name in self.integers)
-
-    def numbers_at(self, point: int) -> dict[str, float]:
-        """Return the real parameters of one point."""
-        return {name: float(column[point]) for name, column in self.floats.items()}
+    floats: Mapping[str, Any]
+    integers: Integers
+    stops: int
 
     @abstractmethod
     def in_state_coordinates(self) -> ModalPoints:
@@ -105,44 +90,45 @@ class BodyPoints(ABC):
         """
 
     @abstractmethod
-    def mass_normalised(self, point: int = 0) -> ImpactingBody:
-        """Return one point as mass-normalised modes under its harmonic force: equations.md 5.2 and 6.4."""
+    def mass_normalised(self) -> ImpactingBody:
+        """Return a body without a flaw as mass-normalised modes under its harmonic force: equations.md 5.2, 6.4."""
 
     @abstractmethod
-    def normalised(self, displacements: Floats, point: int = 0) -> Floats:
-        """Return displacements of a state in mass-normalised modes.
+    def normalised(self, displacements: Floats) -> Floats:
+        """Return displacements of states (m, shape (state, element)) in mass-normalised modes, kg^(1/2) m."""
 
-        Parameters
-        ----------
-        displacements : array, shape (state, mass or mode)
-            m; of an oscillator that of its mass.
+    @property
+    @abstractmethod
+    def flaw(self) -> str:
+        """What keeps it from flying in modes: "coupled" by its damping, or "loose"; empty where nothing does."""
 
-        Returns
-        -------
-        array, shape (state, mode)
-            kg^(1/2) m.
-        """
+    # ---- contacts, in the coordinates of the state ----
 
     @abstractmethod
-    def is_tied(self, point: int = 0) -> bool:
-        """Whether springs hold the body at a point: its slowest mode vibrates."""
+    def contact_shapes(self) -> Floats:
+        """Return the displacement of each contact for 1 m of each element of the state, shape (contact, element)."""
 
-    def is_classical(self, point: int = 0) -> bool:
-        """Whether damping does not couple the modes of a point."""
+    def contact_mobilities(self, shapes: Floats) -> Floats:
+        """Return how an impulse at contacts of these shapes changes the velocities, but for a factor; same shape."""
+        return shapes
+
+    @abstractmethod
+    def contact_masses(self) -> Floats:
+        """Return the mass that each stop feels when it is hit, kg, shape (contact,): equations.md 5.3 and 6.6."""
+
+    # ---- contacts that the FMU knows nothing of ----
+
+    def is_pushed(self) -> bool:
+        """Whether inputs of an FMU without stops can act as forces at all places of stops."""
         return True
 
-    def _contacts(self, shapes: Sequence[Floats], numbers: Numbers) -> tuple[Contact, ...]:
-        """Return the contacts of one point, with the mass-normalised shapes of their places."""
-        ports = [f"contact[{number}]" for number in range(1, len(shapes) + 1)]
-        return tuple(
-            Contact(
-                shape,
-                DIRECTIONS[self.integers[f"{port}.side"]],
-                numbers[f"{port}.position"],
-                numbers[f"{port}.restitution"],
-            )
-            for port, shape in zip(ports, shapes, strict=True)
-        )
+    def variables_at_contacts(self, what: str) -> tuple[str, ...]:
+        """Return the variables at each contact of an FMU without stops: displacement, velocity or force."""
+        return (what,) * self.stops
+
+    def floats_of_contacts(self) -> dict[str, float]:
+        """Return parameters with which an FMU without stops shows its motion, and takes a force, where they are."""
+        return {}
 
 
 def row_of(numbers: Numbers, name: str, count: int) -> Floats:

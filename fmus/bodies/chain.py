@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibroimpact.fmus.bodies.body_points import Numbers, row_of
-from vibroimpact.fmus.bodies.impacting_body import Floats
+from vibroimpact.fmus.bodies.body_points import row_of
+from vibroimpact.fmus.bodies.impacting_body import Floats, Numbers
 from vibroimpact.fmus.bodies.structure import Structure, StructurePoints
 from vibroimpact.fmus.core.modes import ChainModes, chain_modes
 
@@ -28,7 +28,6 @@ class ChainPoints(StructurePoints):
         if not modes.is_classical or not modes.frequencies[0] > 0.0:
             return None
         shapes = modes.shapes[:, :kept]
-        hit = [self.integers[f"contact[{k}].mass_number"] - 1 for k in range(1, self.contacts + 1)]
         return Structure(
             modes.frequencies[:kept],
             modes.damping_ratios[:kept],
@@ -36,7 +35,7 @@ class ChainPoints(StructurePoints):
             shapes.T,
             np.zeros(kept),
             shapes[self.integers["observed_mass"] - 1],
-            shapes[hit].reshape(-1, kept),
+            shapes[self._hit].reshape(-1, kept),
             shapes,
             shapes.T * row_of(numbers, "mass", masses),
         )
@@ -49,16 +48,40 @@ class ChainPoints(StructurePoints):
             np.append(row_of(numbers, "damping", masses), numbers["far_damping"]),
         )
 
-    def normalised(self, displacements: Floats, point: int = 0) -> Floats:
+    def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
-        numbers, (kept, masses, _) = self.numbers_at(point), self.sizes
+        numbers, (kept, masses, _) = self.floats, self.sizes
         shapes = self._modes(numbers).shapes[:, :kept]
         return np.asarray((displacements * row_of(numbers, "mass", masses)) @ shapes)
 
-    def is_tied(self, point: int = 0) -> bool:
-        """Whether springs hold the body at a point."""
-        return bool(self._modes(self.numbers_at(point)).frequencies[0] > 0.0)
+    @property
+    def _hit(self) -> list[int]:
+        """The mass, from 0, of each contact."""
+        return [self.integers[f"contact[{k}].mass_number"] - 1 for k in range(1, self.stops + 1)]
 
-    def is_classical(self, point: int = 0) -> bool:
-        """Whether damping does not couple the modes of a point."""
-        return self._modes(self.numbers_at(point)).is_classical
+    def _masses(self) -> Floats:
+        return row_of(self.floats, "mass", self.integers["masses"])
+
+    def contact_shapes(self) -> Floats:
+        """Return 1 for the mass of each contact, shape (contact, mass)."""
+        return np.eye(self.integers["masses"])[self._hit]
+
+    def contact_mobilities(self, shapes: Floats) -> Floats:
+        """Return the shapes over the masses, shape (contact, mass)."""
+        return shapes / self._masses()
+
+    def contact_masses(self) -> Floats:
+        """Return the mass of each contact, kg."""
+        return self._masses()[self._hit]
+
+    def variables_at_contacts(self, what: str) -> tuple[str, ...]:
+        """Return the variables of the mass of each contact."""
+        return tuple(f"{what}[{hit + 1}]" for hit in self._hit)
+
+    @property
+    def flaw(self) -> str:
+        """Whether its damping couples the modes, or nothing ties it to the ground."""
+        modes = self._modes(self.floats)
+        if not modes.is_classical:
+            return "coupled"
+        return "" if modes.frequencies[0] > 0.0 else "loose"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibroimpact.fmus.bodies.body_points import BodyPoints, ModalPoints
-from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, contacts_of
 
 
 class OscillatorPoints(BodyPoints):
@@ -13,7 +13,7 @@ class OscillatorPoints(BodyPoints):
 
     def in_state_coordinates(self) -> ModalPoints:
         """Return the points as modes, in the coordinates of their states: see `BodyPoints`."""
-        columns, contacts = self.floats, self.contacts
+        columns, contacts = self.floats, self.stops
         mass, count = columns["mass"], len(columns["mass"])
         none, one = np.zeros(count), np.ones((1, count))
         with np.errstate(all="ignore"):  # what is no number is refused by its body
@@ -29,10 +29,10 @@ class OscillatorPoints(BodyPoints):
                 start_p=columns["velocity_start"][None],
             )
 
-    def mass_normalised(self, point: int = 0) -> ImpactingBody:
-        """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
-        numbers = self.numbers_at(point)
-        mass, stiffness, damping = (numbers[name] for name in ("mass", "stiffness", "damping"))
+    def mass_normalised(self) -> ImpactingBody:
+        """Return one point as a mass-normalised mode under its harmonic force: see `BodyPoints`."""
+        numbers = self.floats
+        mass, stiffness, damping = numbers["mass"], numbers["stiffness"], numbers["damping"]
         root = np.sqrt(mass)
         shape = np.array([1.0 / root])
         return ImpactingBody(
@@ -42,14 +42,23 @@ class OscillatorPoints(BodyPoints):
             np.array([numbers.get("force", 0.0) / root]),
             numbers["forcing.angular_frequency"],
             numbers.get("forcing.phase", 0.0),
-            self._contacts([shape] * self.contacts, numbers),
+            contacts_of([shape] * self.stops, numbers, self.integers),
             shape,
         )
 
-    def normalised(self, displacements: Floats, point: int = 0) -> Floats:
+    def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
-        return np.asarray(displacements * np.sqrt(float(self.floats["mass"][point])))
+        return np.asarray(displacements * np.sqrt(self.floats["mass"]))
 
-    def is_tied(self, point: int = 0) -> bool:
-        """Whether springs hold the body at a point."""
-        return bool(self.floats["stiffness"][point] > 0.0)
+    @property
+    def flaw(self) -> str:
+        """Whether it has no spring."""
+        return "" if self.floats["stiffness"] > 0.0 else "loose"
+
+    def contact_shapes(self) -> Floats:
+        """Return 1 for each contact."""
+        return np.ones((self.stops, 1))
+
+    def contact_masses(self) -> Floats:
+        """Return the mass for each contact, kg."""
+        return np.full(self.stops, self.floats["mass"])

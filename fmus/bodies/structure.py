@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.bodies.body_points import BodyPoints, ModalPoints, Numbers, row_of, rows_of, weighted
-from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
+from vibroimpact.fmus.bodies.body_points import BodyPoints, ModalPoints, row_of, rows_of, weighted
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, Numbers, contacts_of
 from vibroimpact.fmus.errors import VibroimpactError
 
 OF_THE_RUN = ("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_")
@@ -60,13 +60,7 @@ class StructurePoints(BodyPoints):
 
     @abstractmethod
     def structure_of(self, numbers: Numbers) -> Structure | None:
-        """Return the modes of one point; None where damping couples them, or it is not tied to the ground.
-
-        Parameters
-        ----------
-        numbers : mapping of str to float
-            Real parameters of the FMU, without those that change no mode.
-        """
+        """Return the modes of one point; None where damping couples them, or it is not tied to the ground."""
 
     @property
     @abstractmethod
@@ -94,7 +88,7 @@ class StructurePoints(BodyPoints):
     def _no_structure(self) -> Structure:
         modes, elements, loads = self.sizes
         row, square = np.full(modes, np.nan), np.full((modes, elements), np.nan)
-        contacts = np.full((self.contacts, modes), np.nan)
+        contacts = np.full((self.stops, modes), np.nan)
         return Structure(row, row, 1.0, np.full((modes, loads), np.nan), row, row, contacts, square.T, square)
 
     def in_state_coordinates(self) -> ModalPoints:
@@ -129,11 +123,11 @@ class StructurePoints(BodyPoints):
                 kind=which,
             )
 
-    def mass_normalised(self, point: int = 0) -> ImpactingBody:
+    def mass_normalised(self) -> ImpactingBody:
         """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
-        numbers = self.numbers_at(point)
+        numbers = self.floats
         found = self.structure_of(numbers)
-        assert found is not None, "a body that is tied and classical"
+        assert found is not None, "a body without a flaw"
         root = np.sqrt(found.mass)
         amplitudes = row_of(numbers, "forcing.amplitude", found.load.shape[1])
         if "forcing.amplitude" in numbers:
@@ -145,7 +139,7 @@ class StructurePoints(BodyPoints):
             numbers.get("force", 0.0) * found.held * root,
             numbers["forcing.angular_frequency"],
             numbers.get("forcing.phase", 0.0),
-            self._contacts(list(found.contacts / root), numbers),
+            contacts_of(found.contacts / root, numbers, self.integers),
             found.observed / root,
         )
 

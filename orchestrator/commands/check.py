@@ -22,8 +22,8 @@ from vibroimpact.orchestrator.commands.failures import FAILED, counted
 from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
+from vibroimpact.orchestrator.run.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.ssp import opened_scene
 
 _WIDTH = 10

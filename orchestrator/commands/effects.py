@@ -14,7 +14,7 @@ from vibroimpact.fmus.units import written_unit
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.operations.effects import Effects
-from vibroimpact.orchestrator.scene.summary import engine
+from vibroimpact.orchestrator.run.summary import engine
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.effects import Share, dataset_of_shares, effects_of, not_called, shares_of
 from vibroimpact.orchestrator.study.motion import (

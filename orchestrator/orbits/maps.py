@@ -23,7 +23,6 @@ from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.provenance import program_attributes, scene_attributes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
 HISTORY = "maps of vibroimpact"
 MapKind = Literal["impact", "strobe", "discontinuity", "nordmark", "square-root"]
@@ -255,7 +254,7 @@ def _nordmark(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
     family = None
     if settings.alpha is None or settings.gamma is None:
         alone = _needed(scene, settings)
-        if not isinstance(alone.body, OscillatorBody):
+        if alone.body.IS_STRUCTURE:
             raise UsageError(
                 f"{alone.source}: body.kind: expected an oscillator for Nordmark's map, got another body."
             )

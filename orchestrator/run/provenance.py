@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.summary import in_one_line
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import in_one_line
 
 _PACKAGES = ("vibroimpact", "numpy", "fmpy", "xarray", "netCDF4", "dask", "distributed")
 _GIT_SECONDS = 5.0

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies import ModalPoints
 from vibroimpact.fmus.core import lanes as core
-from vibroimpact.orchestrator.run.body import body_points
 from vibroimpact.orchestrator.run.many_points.loop import PreparedPoints
+from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]

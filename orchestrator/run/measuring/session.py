@@ -222,7 +222,7 @@ class MeasuredSession:
 
 
 def _refuse_no_plant(scene: Scene, channels: Sequence[str]) -> None:
-    if scene.general is not None or scene.replay is not None or scene.body.kind not in ("oscillator", "beam"):
+    if scene.general is not None or scene.replay is not None or not scene.body.CAN_BE_MEASURED:
         raise UsageError(
             f"{scene.source}: expected an oscillator or a beam with a measuring chain, got another scene."
         )

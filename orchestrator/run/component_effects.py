@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from vibroimpact.fmus.shipped import package_folder
 from vibroimpact.orchestrator.importer.specification import ComponentSpec
+from vibroimpact.orchestrator.run.time_series import follow_energies
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION
-from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 STRUCTURES = ("Chain", "Beam")
@@ -44,15 +44,7 @@ _WHOLE = {
 def called_by_components(general: GeneralScene, axes: tuple[SweepAxis, ...]) -> set[str]:
     """Return the effects that the components of a scene call for, at one point of its sweep at least.
 
-    Parameters
-    ----------
-    general : GeneralScene
-    axes : tuple of SweepAxis
-
-    Returns
-    -------
-    set of str
-        FMUs of other tools call for none that is known.
+    FMUs of other tools call for none that is known.
     """
     swept = {axis.key: max(map(abs, axis.values)) for axis in axes}
     found: set[str] = set()
