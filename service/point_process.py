@@ -26,9 +26,7 @@ from vibroimpact.orchestrator.run.points import BranchPoint, State, columns_of_p
 from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.models import TimeSeries
-from vibroimpact.orchestrator.scene.places import observed_location, observed_mass, stop_location, stop_mass
 from vibroimpact.orchestrator.scene.sweep import Branch, expand
 from vibroimpact.service.landed import files_of
 from vibroimpact.service.slices import finite
@@ -152,23 +150,19 @@ def _watched(scene: Scene, place: BranchPoint) -> Scene:
 def _stops(scene: Scene, names: Sequence[str]) -> dict[str, list[float]]:
     """Return the positions (m) of the stops that limit each sampled displacement, by its name."""
     found: dict[str, list[float]] = {}
-    body = scene.bodies[0]
-    points: list[float | None] = [None] * len(scene.stops)
-    observed: float | None = None
-    if isinstance(body, ChainBody):
-        points = [stop_mass(body, stop) for stop in scene.stops]
-        observed = observed_mass(body, scene.stops)
-    elif isinstance(body, BeamBody):
-        points = [stop_location(stop) for stop in scene.stops]
-        observed = observed_location(body, scene.stops, scene.sensor)
+    if not scene.is_one_body:
+        return found
+    body = scene.body
+    observed = body.observed_place(scene.stops, scene.sensor)
     for name in names:
         word, _, number = name.rstrip("]").partition("[")
-        for place, (stop, point) in enumerate(zip(scene.stops, points, strict=True), start=1):
+        for place, stop in enumerate(scene.stops, start=1):
+            point = body.place_of(stop)
             limited = {
                 "displacement": point == observed and not number,
                 "contact_displacement": number == str(place),
             }
-            is_of_mass = isinstance(body, ChainBody) and word == "displacement" and number == str(point)
+            is_of_mass = body.PLACE == "mass" and word == "displacement" and number == str(point)
             if limited.get(word, False) or is_of_mass:
                 found.setdefault(name, []).append(stop.position)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibroimpact.analysis.orbits.body import Contact, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit, closed_form, find_orbit
+from vibroimpact.fmus.bodies import Contact, ImpactingBody
 
 __all__ = ["Contact", "ImpactingBody", "OrbitError", "PeriodicOrbit", "closed_form", "find_orbit"]

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
 from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
 from vibroimpact.analysis.orbits.loci import Locus
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+from vibroimpact.fmus.bodies.impacting_body import Floats
 
 SAMPLES = 256
 """Of a forcing period, between which an extremum is that of a cubic: to 1e-8 of the displacement."""

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.body import Contact, Floats
 from vibroimpact.analysis.orbits.flight_work import FlightWork, flight_work
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+from vibroimpact.fmus.bodies.impacting_body import Contact, Floats
 from vibroimpact.fmus.errors import UsageError
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts, RecordedOrbit, recorded_orbit
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError
 

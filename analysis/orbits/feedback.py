@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit
+from vibroimpact.fmus.bodies.impacting_body import Floats
 
 Law = Literal["ogy", "deadbeat", "newton"]
 LAWS: tuple[Law, ...] = ("ogy", "deadbeat", "newton")

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import (
     CLOSE,
     TOUCHES,
@@ -24,6 +23,7 @@ from vibroimpact.analysis.orbits.periodic import (
     evaluated,
 )
 from vibroimpact.analysis.orbits.sign_changes import determinant, passes_doubling, turning, turns_round
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 MOST_NEWTON = 12
 EASY_NEWTON = 3

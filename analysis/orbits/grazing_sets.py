@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.normal_forms import one_mode
 from vibroimpact.analysis.orbits.periodic import TURN
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 STEPS = 256
 """Looks at a flight in 8 radians of its fastest part: between two the velocity changes its sign once at most."""

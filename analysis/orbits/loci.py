@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.following import (
     EASY_NEWTON,
     LOCATED,
@@ -24,6 +23,7 @@ from vibroimpact.analysis.orbits.following import (
     SpecialPoint,
 )
 from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 FOLLOWED_KINDS = ("fold", "period doubling", "graze", "graze between impacts")
 JUMP = 0.5

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.periodic import OrbitError
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 TRANSIENT, KEPT = 4000, 200
 """Steps of a map before it is looked at, and those that are kept."""

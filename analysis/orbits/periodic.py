@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 

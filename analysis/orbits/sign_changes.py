@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+from vibroimpact.fmus.bodies.impacting_body import Floats
 
 OPPOSITE = 0.9
 """Cosine of the angle between differences of the halves, below whose negative they are opposite."""

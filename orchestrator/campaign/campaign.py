@@ -69,10 +69,10 @@ from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.dataset import DatasetForm, has_messages
+from vibroimpact.orchestrator.run.limits import may_go_by_lanes
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 from vibroimpact.orchestrator.scene.sweep import run_count
 
 if TYPE_CHECKING:

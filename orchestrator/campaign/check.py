@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.run.dataset import dataset_of
+from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.points import independent_points
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 from vibroimpact.orchestrator.scene.sweep import dimensions, most_points, run_count
 
 MOST_TRIAL_SECONDS = 20.0

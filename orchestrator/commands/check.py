@@ -22,8 +22,8 @@ from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
+from vibroimpact.orchestrator.run.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.preparing import with_modes
 

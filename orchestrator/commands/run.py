@@ -14,8 +14,8 @@ from vibroimpact.orchestrator.commands.failures import FAILED, outcome_lines
 from vibroimpact.orchestrator.operations.run import Run
 from vibroimpact.orchestrator.run.dataset import has_messages
 from vibroimpact.orchestrator.run.progress import shown_progress
+from vibroimpact.orchestrator.run.summary import in_one_line
 from vibroimpact.orchestrator.running import run_scene
-from vibroimpact.orchestrator.scene.summary import in_one_line
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.preparing import prepared
 

@@ -21,18 +21,17 @@ from vibroimpact.analysis.orbits.basins import (
     border_share,
     find_basins,
 )
-from vibroimpact.analysis.orbits.body import ImpactingBody
 from vibroimpact.analysis.study import Study
+from vibroimpact.fmus.bodies.impacting_body import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.basins import Basins as Options
 from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
-from vibroimpact.orchestrator.orbits.body_flow import BodyFlow, start_names
+from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "basins of attraction found by vibroimpact"
@@ -116,27 +115,26 @@ class Plane:
 
 def _axes(scene: Scene, number: int | None) -> tuple[int, int]:
     """Return the places of displacement and velocity of the plane among the start values."""
-    if isinstance(scene.body, OscillatorBody):
+    if not scene.body.IS_STRUCTURE:
         if number not in (None, 1):
             raise UsageError(f"basins: number: expected 1, an oscillator's only mass, got {number}.")
         return 0, 1
     size = len(state_variables(scene)) // 2
-    what = "mass" if isinstance(scene.body, ChainBody) else "mode"
     chosen = number if number is not None else _first_hit(scene)
     if not 1 <= chosen <= size:
-        raise UsageError(f"basins: number: expected a {what} from 1 to {size}, got {chosen}.")
+        raise UsageError(f"basins: number: expected a {scene.body.ELEMENT} from 1 to {size}, got {chosen}.")
     return chosen - 1, size + chosen - 1
 
 
 def _first_hit(scene: Scene) -> int:
     """Return the mass that a chain's first stop hits; 1 of a beam, its first mode."""
-    return integer_parameters(scene)["contact[1].mass_number"] if isinstance(scene.body, ChainBody) else 1
+    return integer_parameters(scene).get("contact[1].mass_number", 1)
 
 
 def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[Floats, Floats, Floats]:
     """Return displacements, velocities and the start states of a plane, shape (y * x, variable)."""
     numbers = float_parameters(scene, None)
-    own = np.array([numbers.get(name, 0.0) for name in start_names(scene)])
+    own = np.array([numbers.get(name, 0.0) for name in scene.body.start_names])
     across, along = _axes(scene, plane.number)
     x, y = (np.linspace(*span, count) for span, count in zip(spans, plane.points, strict=True))
     states = np.repeat(own[None], x.size * y.size, axis=0)
@@ -171,7 +169,7 @@ def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span,
     speed = max(float(table[:, half:].max()), size * body.angular_frequency)
     x = plane.x or (-REACH * size, REACH * size)
     y = plane.y or (-REACH * speed, REACH * speed)
-    if plane.x is None and isinstance(scene.body, OscillatorBody):
+    if plane.x is None and not scene.body.IS_STRUCTURE:
         # a plane beyond the stops has no starts
         for contact in body.contacts:
             x = (
@@ -217,10 +215,10 @@ def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basi
 
 
 def _element(scene: Scene, number: int | None) -> str:
-    if isinstance(scene.body, OscillatorBody):
+    if not scene.body.IS_STRUCTURE:
         return ""
     place = _axes(scene, number)[0] + 1
-    return f" of {'mass' if isinstance(scene.body, ChainBody) else 'mode'} {place}"
+    return f" of {scene.body.ELEMENT} {place}"
 
 
 def span_of(text: str | None, name: str) -> Span | None:

@@ -18,14 +18,12 @@ from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.limits import may_go_by_lanes
 from vibroimpact.orchestrator.run.many_points.lanes_rows import run_prepared_in_lanes
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints
 from vibroimpact.orchestrator.run.many_points.loop_rows import run_loop
-from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
-from vibroimpact.orchestrator.scene.lanes import may_go_by_lanes
 
 RECORDED = 64
 """Forcing periods of which the class of a run is told."""
@@ -37,13 +35,6 @@ _PHASE, _VELOCITY, _CONTACT = (
     IMPACT_COLUMNS.index(f"impact_{name}") for name in ("phase", "velocity", "contact")
 )
 _RECORD = {"transient_periods": 0, "recorded_periods": 1, "impacts": False}
-
-
-def start_names(scene: Scene) -> list[str]:
-    """Return the start values of the state of a scene's body, by their names in its FMU."""
-    if isinstance(scene.body, OscillatorBody):
-        return ["displacement_start", "velocity_start"]
-    return [name.replace("[", "_start[") for name in state_variables(scene)]
 
 
 class _Closing(Exception):
@@ -64,7 +55,7 @@ class BodyFlow:
         self._bare = [self._loop(bare) for _ in range(count)]
         self._telling = [self._loop(told) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
-        self.names = start_names(scene)
+        self.names = scene.body.start_names
 
     def _loop(self, record: dict[str, Any]) -> PointLoop:
         limits = {"execution.how": "auto", "execution.deadline": DEADLINE}

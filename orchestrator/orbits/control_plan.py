@@ -17,7 +17,6 @@ from vibroimpact.fmus.packaging.python_fmus import build_orbit_controller
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
 MOST_ROWS = 100_000
 LONGEST_STAY = 500
@@ -183,7 +182,7 @@ def control_plan(scene: Scene, start: float, stop: float, settings: ControlSetti
     """
     settings.refuse()
     alone = scene.unswept(varied=["forcing.angular_frequency"])
-    if not isinstance(alone.body, OscillatorBody):
+    if alone.body.IS_STRUCTURE:
         raise UsageError(
             f"{scene.source}: body.kind: expected an oscillator, whose state an impact tells, got another body."
         )

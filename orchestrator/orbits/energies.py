@@ -14,7 +14,6 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import UnitSystem
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.energies import (
     OrbitEnergies,
     energy_transfer,
@@ -24,6 +23,7 @@ from vibroimpact.analysis.orbits.energies import (
 )
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import recorded_orbit
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal

@@ -16,7 +16,6 @@ import xarray as xr
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import UnitSystem
 from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
-from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.grazing_sets import grazing_sets
 from vibroimpact.analysis.orbits.normal_forms import (
     GrazingFamily,
@@ -28,6 +27,7 @@ from vibroimpact.analysis.orbits.normal_forms import (
 )
 from vibroimpact.analysis.orbits.periodic import TURN
 from vibroimpact.analysis.study import Study
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.terminal import say
@@ -38,7 +38,6 @@ from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "maps of vibroimpact"
@@ -350,7 +349,7 @@ def _nordmark(scene: Scene | None, settings: MapSettings) -> tuple[Nordmark, Gra
         restitution = 1.0 if settings.restitution is None else settings.restitution
         return Nordmark(settings.alpha, settings.gamma, restitution), None
     alone = _needed(scene, settings)
-    if not isinstance(alone.body, OscillatorBody):
+    if alone.body.IS_STRUCTURE:
         raise UsageError(
             f"{alone.source}: body.kind: expected an oscillator for Nordmark's map, got another body."
         )

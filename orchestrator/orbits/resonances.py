@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.energies import OrbitEnergies
 from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal

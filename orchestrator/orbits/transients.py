@@ -19,9 +19,9 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
 from vibroimpact.analysis.orbits.classify import RunClass
 from vibroimpact.analysis.study import Study
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.printing import table
@@ -29,7 +29,7 @@ from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.transients import TransientsOf
 from vibroimpact.orchestrator.orbits.basins import beyond_stops
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.body_flow import BodyFlow, start_names
+from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
@@ -93,7 +93,7 @@ class Transients(Study[Floats]):
         _refuse(self)
         self.scene = self.scene.unswept()
         self.is_forced = self.scene.period is not None
-        if not self.is_forced and self.scene.general is None and self.scene.replay is None:
+        if not self.is_forced and self.scene.is_lone_body:
             self.scene = _with_the_first_mode(self.scene)
         self.body = impacting_body(self.scene)
 
@@ -129,7 +129,7 @@ class Transients(Study[Floats]):
     def _first_states(self) -> Floats:
         """Return the scene's own start, and others around it on the free side of the stops."""
         numbers = float_parameters(self.scene, None)
-        own = np.array([[numbers.get(name, 0.0) for name in start_names(self.scene)]])
+        own = np.array([[numbers.get(name, 0.0) for name in self.scene.body.start_names]])
         draw = np.random.default_rng(1)
         found = [own]
         for _ in range(self.starts):

@@ -8,18 +8,16 @@ then rest on their stops. All other motion is kept. A compliant stop is just pre
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.core import beam_modes
-from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
-from vibroimpact.orchestrator.scene.models import RestitutionStop, Stop
-from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
+from vibroimpact.fmus.bodies import BodyPoints
+from vibroimpact.orchestrator.scene.laws import LAWS
+from vibroimpact.orchestrator.scene.models import Stop
 
 Floats = NDArray[np.float64]
+State = tuple[float, ...]
 
 #: Distance beyond a stop, relative to the sum of what the modes contribute, above which the stop has moved.
 MOVED = 1e-12
@@ -29,25 +27,16 @@ ROUNDING = 2.0 * float(np.finfo(np.float64).eps)
 MARGIN = 1e-14
 
 
-def on_free_side(scene: Scene, body: ChainBody | BeamBody, state: tuple[float, ...]) -> tuple[float, ...]:
-    """Return a state that passes no rigid stop.
-
-    Parameters
-    ----------
-    scene : Scene
-    body : ChainBody or BeamBody
-        The body of the scene.
-    state : tuple of float
-        N displacements (m), then N velocities (m/s), of masses or modes.
-    """
-    q, p = np.array(state).reshape(2, body.size)
-    rigid = [stop for stop in scene.stops if isinstance(stop, RestitutionStop)]
+def on_free_side(body: BodyPoints, stops: Sequence[Stop], state: State) -> State:
+    """Return a state of a structure that passes no rigid stop."""
+    rigid = [number for number, stop in enumerate(stops) if LAWS[stop.law].is_rigid]
     if not rigid:
         return state
-    signs = np.array([1.0 if stop.side == "upper" else -1.0 for stop in rigid])
-    positions = np.array([stop.position for stop in rigid])
-    shapes = contact_shapes(body, rigid)
-    motions = shapes / np.array(body.masses) if isinstance(body, ChainBody) else shapes
+    q, p = np.array(state).reshape(2, -1)
+    signs = np.array([1.0 if stops[number].side == "upper" else -1.0 for number in rigid])
+    positions = np.array([stops[number].position for number in rigid])
+    shapes = body.contact_shapes()[rigid]
+    motions = body.contact_mobilities(shapes)
     active = np.zeros(len(rigid), dtype=bool)
     moved = active.copy()
     for _ in rigid:  # pushing back from one stop may push into another
@@ -68,12 +57,3 @@ def _smallest(shapes: Floats, motions: Floats, wanted: Floats) -> Floats:
     """Return the smallest motion, by its kinetic energy, that moves the contacts by so much."""
     forces = np.linalg.lstsq(shapes @ motions.T, wanted, rcond=None)[0]
     return np.asarray(motions.T @ forces, dtype=np.float64)
-
-
-def contact_shapes(body: ChainBody | BeamBody, stops: Sequence[Stop]) -> Floats:
-    """Return the displacement of each contact for 1 m of each mass or mode, shape (stop, N)."""
-    if isinstance(body, ChainBody):
-        return np.eye(body.size)[[stop_mass(body, stop) - 1 for stop in stops]]
-    locations = np.array([stop_location(stop) for stop in stops])
-    boundary: Any = body.boundary.replace("-", "_")
-    return np.asarray(beam_modes(boundary, body.size).shapes(locations))

@@ -8,7 +8,7 @@ from pathlib import Path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.export import export_fmu
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, exported_floats, integer_parameters
+from vibroimpact.orchestrator.run.parameters import exported_floats, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 
 
@@ -62,7 +62,7 @@ def export_scene(
             "of a body has it, got one that falls with the distance. Leave it out, or connect an Exciter to the FMU."
         )
     return export_fmu(
-        FMU_NAMES[scene.body.kind],
+        scene.body.FMU,
         output,
         contacts=len(scene.stops),
         fmi=fmi,

@@ -1,40 +1,24 @@
-"""From a scene to its body's FMU: which one, its parameters, and the state that a continuation carries."""
+"""From a scene to its body: the parameters of its FMU, what a continuation carries, and one object of modes."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, cast
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from vibroimpact.fmus.core.contact_laws import contact_law
+from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints, Columns
+from vibroimpact.fmus.core.contact_laws import contact_laws
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import fmu_variables_of
 from vibroimpact.orchestrator.scene.keys import MODES
+from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import Exciter
-from vibroimpact.orchestrator.scene.models import Forcing, RestitutionStop
-from vibroimpact.orchestrator.scene.places import (
-    forcing_location,
-    observed_location,
-    observed_mass,
-    stop_location,
-    stop_mass,
-)
-
-if TYPE_CHECKING:
-    from vibroimpact.fmus.core import Boundary
 
 Floats = NDArray[np.float64]
-FMU_NAMES = {"oscillator": "Oscillator", "chain": "Chain", "beam": "Beam"}
 SIDE_NUMBERS = {"upper": 1, "lower": 2}
-BOUNDARY_NUMBERS = {"clamped-free": 1, "clamped-clamped": 2, "clamped-pinned": 3, "pinned-pinned": 4}
-FORCING_NUMBERS = {"force": 1, "uniform": 2, "mode": 3, "base_acceleration": 4}
-PROJECTION_NUMBERS = {"variational": 1, "collocation": 2}
 
 
 def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str, float]:
@@ -49,14 +33,16 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
         velocity (m/s), else the values of `state_variables`. What lies beyond a rigid stop (the stop moved)
         is put on it, at rest. None: the scene's own start.
     """
-    parameters = _own_floats(scene) | contact_floats(scene)
+    body = scene.body
+    parameters = named_numbers(body, body.size) | body.fmu_floats(scene.forcing, scene.stops, scene.sensor)
+    parameters |= contact_floats(scene)
     if scene.forcing is not None:
         parameters |= named_numbers(scene.forcing)
     if scene.exciter is not None:
         parameters |= _exciter_floats(scene, scene.exciter, parameters)
     parameters |= named_numbers(scene.execution)
     if start is not None:
-        parameters |= _carried(scene, start)
+        parameters |= dict(zip(scene.body.start_names, free_state(scene, start, parameters), strict=True))
         if scene.period is not None:
             parameters["forcing.phase"] = 0.0
     return parameters
@@ -69,7 +55,7 @@ def exported_floats(scene: Scene) -> dict[str, float]:
     the inertial force, and adds the base to the accelerations itself; an export has the base.
     """
     parameters, forcing = float_parameters(scene, None), scene.forcing
-    if forcing is None or forcing.kind != "base_acceleration" or isinstance(scene.body, BeamBody):
+    if forcing is None or forcing.kind != "base_acceleration" or scene.body.KNOWS_BASE:
         return parameters
     forces = [name for name in parameters if name.startswith("forcing.amplitude")]
     return parameters | dict.fromkeys(forces, 0.0) | {"forcing.base_acceleration": forcing.scalar_amplitude}
@@ -83,15 +69,18 @@ def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
     table : BaseModel
         What it leaves out, and has no default, is left out.
     size : int
-        Elements of each array: masses or modes.
+        Elements of each array, masses or modes: as given, one for all, or 0 for those at the end left out.
     """
     parameters: dict[str, float] = {}
     for variable in fmu_variables_of(type(table)):
         value = getattr(table, variable.key)
         if value is None or (variable.is_told_if_given and variable.attribute not in table.model_fields_set):
             continue
-        own = numbered(variable.name, each(value, size)) if variable.is_array else {variable.name: value}
-        parameters |= own
+        if not variable.is_array:
+            parameters[variable.name] = value
+            continue
+        each = value + (0.0,) * (size - len(value)) if isinstance(value, tuple) else (value,) * size
+        parameters |= {f"{variable.name}[{number}]": one for number, one in enumerate(each, start=1)}
     return parameters
 
 
@@ -102,28 +91,11 @@ def _exciter_floats(scene: Scene, exciter: Exciter, forced: Mapping[str, float])
     """
     if scene.falling_force:
         parameters = dict.fromkeys(forced.keys() & {"forcing.amplitude"}, 0.0)
-        if isinstance(scene.body, BeamBody):
+        if "forcing_location" in forced:
             parameters["sensor[1].location"] = forced["forcing_location"]
         return parameters | {"force": 0.0}
     amplitude = {key: exciter.gain * forced[key] for key in forced.keys() & {"forcing.amplitude"}}
     return amplitude | {"force": exciter.offset}
-
-
-def _own_floats(scene: Scene) -> dict[str, float]:
-    body = scene.body
-    if isinstance(body, OscillatorBody):
-        return oscillator_floats(body, scene)
-    return chain_floats(body, scene) if isinstance(body, ChainBody) else beam_floats(body, scene)
-
-
-def _carried(scene: Scene, start: tuple[float, ...]) -> dict[str, float]:
-    if isinstance(scene.body, OscillatorBody):
-        return oscillator_start(scene, start)
-    # what finds the shapes of a beam takes time to load, and only a continuation of structures needs it
-    from vibroimpact.orchestrator.run.carried_state import on_free_side
-
-    names = [name.replace("[", "_start[") for name in state_variables(scene)]
-    return dict(zip(names, on_free_side(scene, scene.body, start), strict=True))
 
 
 def refuse_unknown_modes(scene: Scene) -> None:
@@ -134,7 +106,7 @@ def refuse_unknown_modes(scene: Scene) -> None:
     UsageError
         It has `modes = "auto"`.
     """
-    if isinstance(scene.body, BeamBody | ChainBody) and scene.body.modes == "auto":
+    if scene.body.finds_modes:
         raise UsageError(
             f'{scene.source}: body.modes: expected a number of modes, got "auto". run and campaign find it; '
             "accuracy shows what each number costs."
@@ -145,11 +117,11 @@ def integer_parameters(scene: Scene) -> dict[str, int]:
     """Return the integer, enumeration and Boolean (`bool`) parameters of the body's FMU."""
     refuse_unknown_modes(scene)
     parameters = {"impact_limit": scene.execution.impact_limit}
-    if isinstance(scene.body, ChainBody):
-        parameters |= chain_integers(scene.body, scene)
-    elif isinstance(scene.body, BeamBody):
-        parameters |= beam_integers(scene.body, scene)
-    return parameters | contact_integers(scene)
+    parameters |= scene.body.fmu_integers(scene.forcing, scene.stops)
+    for k, stop in enumerate(scene.stops, start=1):
+        parameters[f"contact[{k}].law"] = contact_laws()[stop.law].number
+        parameters[f"contact[{k}].side"] = SIDE_NUMBERS[stop.side]
+    return parameters
 
 
 def state_variables(scene: Scene) -> tuple[str, ...]:
@@ -158,18 +130,13 @@ def state_variables(scene: Scene) -> tuple[str, ...]:
     Of a chain those of its masses, of a beam those of its modes. Empty for an oscillator, whose state is that
     of the observed point, and for a general scene.
     """
-    body = scene.bodies[0]
-    if not isinstance(body, ChainBody | BeamBody):
-        return ()
-    kind = "" if isinstance(body, ChainBody) else "modal_"
-    numbers = range(1, body.size + 1)
-    return tuple(f"{kind}{name}[{i}]" for name in ("displacement", "velocity") for i in numbers)
+    return scene.body.state_variables if scene.is_one_body else ()
 
 
 def most_elements(scene: Scene) -> int:
     """Return how many masses or modes a structure has, where a sweep varies them the most of them; else 0."""
-    is_beam = isinstance(scene.bodies[0], BeamBody)  # the state of a chain is that of its masses
-    swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES and is_beam]
+    grows = scene.is_one_body and scene.body.KEEPS_MODES
+    swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES and grows]
     return int(swept[0]) if swept else len(state_variables(scene)) // 2
 
 
@@ -196,132 +163,42 @@ def without_padding(state: tuple[float, ...] | None, elements: int) -> tuple[flo
 
 
 def contact_floats(scene: Scene) -> dict[str, float]:
-    """Return the real parameters of all contact ports, by variable name, SI."""
+    """Return the numbers of all stops as parameters of their contact ports, by variable name, SI."""
     parameters: dict[str, float] = {}
     for k, stop in enumerate(scene.stops, start=1):
         port = f"contact[{k}]"
         parameters |= {name.replace("contact[k]", port): value for name, value in named_numbers(stop).items()}
-        if isinstance(scene.body, BeamBody):
-            parameters[f"{port}.location"] = stop_location(stop)
     return parameters
 
 
-def contact_integers(scene: Scene) -> dict[str, int]:
-    """Return the integer and enumeration parameters of all contact ports."""
-    parameters: dict[str, int] = {}
-    for k, stop in enumerate(scene.stops, start=1):
-        port = f"contact[{k}]"
-        parameters[f"{port}.law"] = contact_law(stop.law).number
-        parameters[f"{port}.side"] = SIDE_NUMBERS[stop.side]
-        if isinstance(scene.body, ChainBody):
-            parameters[f"{port}.mass_number"] = stop_mass(scene.body, stop)
-    return parameters
+def free_state(
+    scene: Scene, state: tuple[float, ...], floats: Mapping[str, float] | None = None
+) -> tuple[float, ...]:
+    """Return a state that passes no rigid stop: N displacements (m), then N velocities (m/s), of masses or modes.
 
-
-def oscillator_floats(body: OscillatorBody, scene: Scene) -> dict[str, float]:
-    """Return the real parameters of the Oscillator, by variable name, SI."""
-    parameters = named_numbers(body)
-    if scene.forcing is not None:
-        # a base that accelerates is an inertial force on the relative coordinate
-        scale = 1.0 if scene.forcing.kind == "force" else -body.mass
-        parameters["forcing.amplitude"] = scale * scene.forcing.scalar_amplitude
-    return parameters
-
-
-def oscillator_start(scene: Scene, state: tuple[float, ...]) -> dict[str, float]:
-    """Return the start state that continues from a displacement (m) and a velocity (m/s).
-
-    A displacement beyond a rigid stop (the stop moved) is put on it, at rest; a compliant one is pressed in.
+    A stop that has moved puts an oscillator at rest on it, and pushes a structure back: see `carried_state`.
     """
+    if scene.body.IS_STRUCTURE:
+        from vibroimpact.orchestrator.run.carried_state import on_free_side  # few scenes need it
+
+        return on_free_side(body_points(scene, floats), scene.stops, state)
     displacement, velocity = state
     for stop in scene.stops:
         sign = 1.0 if stop.side == "upper" else -1.0
-        if isinstance(stop, RestitutionStop) and sign * (displacement - stop.position) > 0.0:
+        if LAWS[stop.law].is_rigid and sign * (displacement - stop.position) > 0.0:
             displacement, velocity = stop.position, 0.0
-    return {"displacement_start": displacement, "velocity_start": velocity}
+    return displacement, velocity
 
 
-def numbered(name: str, values: Sequence[float]) -> dict[str, float]:
-    """Return values by the variable names `name[1]`, `name[2]`, ...
+def body_points(scene: Scene, columns: Columns | Mapping[str, float] | None = None) -> BodyPoints:
+    """Return the body of a scene as one object: modes, contacts, forcing and what is observed.
 
-    >>> numbered("mass", (1.0, 2.0))
-    {'mass[1]': 1.0, 'mass[2]': 2.0}
+    Parameters
+    ----------
+    scene : Scene
+        Of the short form.
+    columns : mapping of str to ndarray, shape (point,), or to float, or None
+        Real parameters of the body's FMU at the points of the sweep, or at one; None: those of the scene as it is.
     """
-    return {f"{name}[{number}]": value for number, value in enumerate(values, start=1)}
-
-
-def each(values: float | tuple[float, ...], count: int) -> tuple[float, ...]:
-    """Return one number for each of `count`: as given, one for all, or 0 for those at the end left out.
-
-    >>> each(2.0, 3), each((1.0,), 3)
-    ((2.0, 2.0, 2.0), (1.0, 0.0, 0.0))
-    """
-    if not isinstance(values, tuple):
-        return (values,) * count
-    return values + (0.0,) * (count - len(values))
-
-
-def chain_floats(body: ChainBody, scene: Scene) -> dict[str, float]:
-    """Return the real parameters of the Chain, by variable name, SI."""
-    parameters = named_numbers(body, body.size)
-    if scene.forcing is not None:
-        parameters |= numbered("forcing.amplitude", _amplitudes(body, scene.forcing))
-    return parameters
-
-
-def _amplitudes(body: ChainBody, forcing: Forcing) -> tuple[float, ...]:
-    """Return the amplitude of the force on each mass, N."""
-    if forcing.kind == "base_acceleration":
-        # a base that accelerates is an inertial force on each relative coordinate
-        return tuple(-mass * forcing.scalar_amplitude for mass in body.masses)
-    return each(forcing.amplitude, body.size)
-
-
-def chain_integers(body: ChainBody, scene: Scene) -> dict[str, int]:
-    """Return the integer parameters of the Chain."""
-    modes = 0 if body.modes is None else body.modes
-    assert modes != "auto"  # else refused
-    return {"masses": body.size, "modes": modes, "observed_mass": observed_mass(body, scene.stops)}
-
-
-def beam_floats(body: BeamBody, scene: Scene) -> dict[str, float]:
-    """Return the real parameters of the Beam, by variable name, SI."""
-    parameters = named_numbers(body, body.size)
-    if body.frequency is not None:
-        parameters["flexural_rigidity"] = rigidity_of_frequency(body)
-    if body.rayleigh is not None:
-        parameters |= named_numbers(body.rayleigh)
-    parameters["sensor_location"] = observed_location(body, scene.stops, scene.sensor)
-    parameters["forcing_location"] = forcing_location(body, scene.forcing)
-    if scene.forcing is not None:
-        parameters["forcing.amplitude"] = scene.forcing.scalar_amplitude
-    return parameters
-
-
-def rigidity_of_frequency(body: BeamBody) -> float:
-    """Return the flexural rigidity, N m^2, that gives a beam its first natural frequency (thesis eq. 7.16).
-
-    w_1 = (xi_1 / length)^2 sqrt(rigidity / mass_per_length), xi_1 the first eigenvalue of its boundary.
-    """
-    from vibroimpact.fmus.core import beam_modes  # loads numpy and the core; few scenes need it
-
-    assert body.frequency is not None
-    assert body.mass_per_length is not None
-    eigenvalue = float(beam_modes(cast("Boundary", body.boundary.replace("-", "_")), 1).eigenvalues[0])
-    angular = 2.0 * math.pi * body.frequency
-    return body.mass_per_length * (angular * (body.length / eigenvalue) ** 2) ** 2
-
-
-def beam_integers(body: BeamBody, scene: Scene) -> dict[str, int]:
-    """Return the integer, enumeration and Boolean parameters of the Beam."""
-    parameters = {
-        "modes": body.size,
-        "residual": bool(body.residual),
-        "boundary": BOUNDARY_NUMBERS[body.boundary],
-        "impact_projection": PROJECTION_NUMBERS[body.impact_projection],
-    }
-    if scene.forcing is not None:
-        parameters["forcing.kind"] = FORCING_NUMBERS[scene.forcing.kind]
-        if scene.forcing.mode is not None:
-            parameters["forcing.mode"] = scene.forcing.mode
-    return parameters
+    floats = float_parameters(scene, None) if columns is None else columns
+    return POINTS_OF_FMU[scene.body.FMU](floats, integer_parameters(scene), len(scene.stops))

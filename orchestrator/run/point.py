@@ -22,9 +22,9 @@ from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, loop_of
 from vibroimpact.orchestrator.run.parameters import (
-    FMU_NAMES,
     float_parameters,
     integer_parameters,
     most_elements,
@@ -50,8 +50,6 @@ from vibroimpact.orchestrator.run.window import (
     recorded_window,
 )
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
-from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
@@ -109,7 +107,7 @@ class PointRunner(Runner):
             sampled=self._plan.variables,
             state=state_variables(scene),
             energies=self._plan.energies,
-            slowest=not isinstance(scene.body, OscillatorBody),
+            slowest=scene.body.IS_STRUCTURE,
         )
         self._built_for = built_for(scene)
 
@@ -169,7 +167,7 @@ class PointRunner(Runner):
 
 def built_for(scene: Scene) -> tuple[object, ...]:
     """Return what the components of a scene are made for, and no new parameter changes."""
-    return getattr(scene.body, "size", 1), getattr(scene.body, "modes", None), scene.execution.macro_step
+    return scene.body.size, scene.body.kept_modes, scene.execution.macro_step
 
 
 def driver_of(
@@ -182,7 +180,7 @@ def driver_of(
 ) -> RecordedBody:
     """Return what drives a scene's body: fused, or coupled to its stops and to other components."""
     floats, integers = float_parameters(scene, None), integer_parameters(scene)
-    fmu = FMU_NAMES[scene.body.kind]
+    fmu = scene.body.FMU
     if execution in ("fused", "lanes"):
         return BodyDriver(floats, integers, fmu, wrap=wrap)
     if execution == "coupled":
@@ -303,16 +301,16 @@ class _Run:
         The contact force has not reached zero over the whole recording or, without a period, over one of the
         slowest mode, within which every mode of the held body has pulled at its strongest.
         """
-        if isinstance(self.scene.body, OscillatorBody):
-            return self._is_pressed(self.scene.body, resting[0][0])
+        if not self.scene.body.IS_STRUCTURE:
+            return self._is_pressed(resting[0][0])
         slowest = self.driver.slowest() if self.scene.period is None else 0.0
         long_enough = TWO_PI / slowest if slowest > 0.0 else self.end_time - self.begin_time
         return self.driver.time - min(start for _, start in resting) >= long_enough
 
-    def _is_pressed(self, body: OscillatorBody, contact: int) -> bool:
+    def _is_pressed(self, contact: int) -> bool:
         stop = self.scene.stops[contact - 1]
         sign = 1.0 if stop.side == "upper" else -1.0
-        press = sign * (self.parameters.get("force", 0.0) - body.stiffness * stop.position)
+        press = sign * (self.parameters.get("force", 0.0) - self.parameters["stiffness"] * stop.position)
         if self.scene.falling_force:
             return self.scene.period is None  # what the force is elsewhere nobody knows before
         return self.scene.period is None or press > abs(self.parameters.get("forcing.amplitude", 0.0))

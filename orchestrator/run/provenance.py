@@ -9,8 +9,8 @@ from typing import Any
 
 from vibroimpact.analysis.dataset.provenance import program_attributes, versions
 from vibroimpact.orchestrator.run import RunnerIdentity
+from vibroimpact.orchestrator.run.summary import in_one_line
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import in_one_line
 
 
 def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:

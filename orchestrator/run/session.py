@@ -82,7 +82,7 @@ class Session:
 
     def _has(self, name: str) -> bool:
         # a chain takes a force on each of its masses
-        return name != "force" or self._scene.body.kind != "chain"
+        return name != "force" or "force" not in self._scene.body.AMPLITUDES
 
     @property
     def time(self) -> float:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
-from vibroimpact.orchestrator.scene.models import Forcing, RestitutionStop
-from vibroimpact.orchestrator.scene.sampled_names import fmu_variables, follow_energies, forced_mass
+from vibroimpact.orchestrator.scene.models import Forcing
+from vibroimpact.orchestrator.scene.sampled_names import AT_CONTACT
 
 FEWEST_SAMPLES = 10
 """Samples of a contact; with fewer they miss its largest force."""
+_ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
+_FOLLOWED = ("modal_energy[", "energy.")
 
 
 class TimeSeriesPlan:
@@ -48,12 +52,12 @@ class TimeSeriesPlan:
         self.names = tuple(name for name in self.all_names if name not in CHANNELS)
         parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
-        self.energies = scene.body.kind != "oscillator" and follow_energies(self.names)
-        yields = any(not isinstance(stop, RestitutionStop) for stop in scene.stops)
+        self.energies = scene.body.IS_STRUCTURE and follow_energies(self.names)
+        yields = any(not LAWS[stop.law].is_rigid for stop in scene.stops)
         felt = ("contact_force", "acceleration")
         self.feels_contacts = yields and any(name.startswith(felt) for name in self.names)
         # a beam knows that its base moves; the others see it as forces on their masses only
-        self._relative = scene.body.kind != "beam"
+        self._relative = not scene.body.KNOWS_BASE
         self._columns = [[self.variables.index(variable) for variable in part] for part in parts]
 
     def is_plain(self, forcing: Forcing | None) -> bool:
@@ -196,3 +200,35 @@ def _amplitude(forcing: Forcing | None, name: str) -> float:
     if mass is not None and isinstance(forcing.amplitude, tuple):
         return forcing.amplitude[mass - 1]
     return forcing.scalar_amplitude
+
+
+def fmu_variables(name: str, stops: int) -> tuple[str, ...]:
+    """Return the variables of the body's FMU whose sum a sampled variable is; none for the forcing.
+
+    Examples
+    --------
+    >>> fmu_variables("contact_force", 2), fmu_variables("contact_displacement[2]", 2)
+    (('contact[1].force', 'contact[2].force'), ('contact[2].displacement',))
+    >>> fmu_variables("displacement[3]", 0), fmu_variables("forcing[1]", 0)
+    (('displacement[3]',), ())
+    """
+    if name == "contact_force":
+        return tuple(f"contact[{k}].force" for k in range(1, stops + 1))
+    match = _ELEMENT.fullmatch(name)
+    word = match[1] if match else name
+    if word == "forcing":
+        return ()
+    if match and word in AT_CONTACT:
+        return (f"contact[{match[2]}].{AT_CONTACT[word]}",)
+    return (name,)
+
+
+def forced_mass(name: str) -> int | None:
+    """Return the mass (1-based) that `forcing[i]` acts on; None for any other name."""
+    match = _ELEMENT.fullmatch(name)
+    return int(match[2]) if match and match[1] == "forcing" else None
+
+
+def follow_energies(names: Iterable[str]) -> bool:
+    """Whether the body must follow its energies for these variables; that costs time at every step."""
+    return any(name.startswith(_FOLLOWED) for name in names)

@@ -21,7 +21,6 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import file_state
 from vibroimpact.orchestrator.run import Runner, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES
 from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
@@ -138,7 +137,7 @@ def _key(scene: Scene, execution: str | None) -> tuple[Any, ...] | None:
     if not scene.is_lone_body or scene.execution.guard:
         return None
     try:
-        files = tuple(file_state(path.stat()) for path in _components(FMU_NAMES[scene.body.kind]))
+        files = tuple(file_state(path.stat()) for path in _components(scene.body.FMU))
     except (OSError, ComponentFileError):
         return None  # who opens it says what is wrong
     return pickle.dumps(scene), execution, files

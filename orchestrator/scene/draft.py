@@ -8,7 +8,7 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
@@ -130,7 +130,7 @@ class Draft(DraftTables):
     @property
     def finds_modes(self) -> bool:
         """Whether the number of modes is to be found."""
-        return isinstance(self.body, BeamBody | ChainBody) and self.body.modes == "auto"
+        return self.body is not None and self.body.finds_modes
 
     def worst(self, *tables: str) -> str:
         """Return a note for a number that may be the worst of a sweep over keys of these tables."""

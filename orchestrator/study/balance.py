@@ -11,7 +11,6 @@ from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.study.observation import Floats
 
 BALANCED = (
@@ -53,7 +52,7 @@ def balance_of(scene: Scene) -> float:
     scene : Scene
         Of the short form, without a sweep. It is run once more, since energies take time.
     """
-    if not scene.is_lone_body or isinstance(scene.body, OscillatorBody):
+    if not scene.is_lone_body or not scene.body.IS_STRUCTURE:
         return math.nan
     begin, end = recorded_window(scene, float_parameters(scene, None))
     series = {"rate": SAMPLES / (end - begin), "variables": list(BALANCED)}

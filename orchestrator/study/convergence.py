@@ -10,7 +10,6 @@ from itertools import islice, pairwise
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.study.errors import errors_of
@@ -153,7 +152,7 @@ class ModeRuns:
             else "other impacts with each number"
         )
         hint = "Ask for less, or record less: impact times and velocities converge last."
-        if isinstance(self.scene.body, BeamBody) and not self.scene.body.residual:
+        if not (self.scene.body.HAS_MASSES or self.scene.body.has_residual_vectors):
             hint += " residual = true keeps the static flexibility of the modes that are left out."
         return SceneError(
             [
@@ -187,7 +186,7 @@ class _Jointly:
     @property
     def ends_exactly(self) -> bool:
         """Whether the finest run has all modes that there are."""
-        return isinstance(self.points[0].scene.body, ChainBody)
+        return self.points[0].scene.body.HAS_MASSES
 
     @property
     def by(self) -> str:

@@ -18,8 +18,8 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.fmus.units import written_unit
 from vibroimpact.orchestrator.operations.effects import Effects
+from vibroimpact.orchestrator.run.summary import engine
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import engine
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.effects import (
     Share,

@@ -16,12 +16,11 @@ import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.analysis.dataset.results import SECONDS, ResultTable
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.run.summary import effects as called_effects
+from vibroimpact.orchestrator.run.summary import laws
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import DAMPING
-from vibroimpact.orchestrator.scene.summary import effects as called_effects
-from vibroimpact.orchestrator.scene.summary import laws
 from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
 from vibroimpact.orchestrator.study.motion import (
@@ -147,12 +146,12 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
         yield from _of_numbers(scene)
         for number, (key, law) in enumerate(laws(scene).items()):
             yield _without(scene, f"{law} stop", key, _removes("stop", number))
-        if isinstance(scene.body, BeamBody) and scene.body.size > 1:
+        if scene.body.ELEMENT == "mode" and scene.body.size > 1:
             half = scene.body.size // 2
             yield _without(
                 scene, f"modes {half + 1} to {scene.body.size}", "body.modes", _sets("body", "modes", half)
             )
-        if isinstance(scene.body, BeamBody) and scene.body.residual:
+        if scene.body.has_residual_vectors:
             yield _without(scene, "residual vectors", "body.residual", _sets("body", "residual", False))
         for name in RECORDED if scene.replay is None else ():
             if getattr(scene.record, name) and (name == "impacts" or scene.period is not None):

@@ -7,10 +7,10 @@ from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.run.summary import chain_effects
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, LOAD_CELL, MEASURED_SENSOR
-from vibroimpact.orchestrator.scene.summary import chain_effects
 
 Change = Callable[[dict[str, Any]], None]
 

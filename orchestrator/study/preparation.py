@@ -6,7 +6,6 @@ import json
 import math
 
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.study.convergence import Note
 from vibroimpact.orchestrator.study.errors import errors_of
@@ -152,7 +151,7 @@ def _largest(points: int) -> str:
 
 
 def _finds_modes(scene: Scene) -> bool:
-    return isinstance(scene.bodies[0], BeamBody | ChainBody) and scene.bodies[0].modes == "auto"
+    return scene.is_one_body and scene.body.finds_modes
 
 
 def _error_of_solution(scene: Scene, run: Observation) -> float:

@@ -12,18 +12,13 @@ import numpy as np
 
 from vibroimpact.analysis.landmarks import ImpactOscillator
 from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
-from vibroimpact.orchestrator.run.parameters import float_parameters
+from vibroimpact.orchestrator.run.parameters import body_points, float_parameters
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody
-from vibroimpact.orchestrator.scene.models import (
-    KelvinVoigtStop,
-    RestitutionStop,
-)
+from vibroimpact.orchestrator.scene.laws import all_rigid, integrates_contacts
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 from vibroimpact.orchestrator.study.ways.replays import span_of
 from vibroimpact.orchestrator.study.ways.span import first_part, window_of
-from vibroimpact.orchestrator.study.ways.strangers import contact_masses
 from vibroimpact.orchestrator.study.ways.way import opened_trial
 
 DISTURBANCE = 1e-9
@@ -105,11 +100,11 @@ def best_of(scene: Scene) -> Scene:
         step = scene.macro_step * FINEST_STEP
         return scene.with_values({"execution.macro_step": step, "execution.exchange": "iterated"})
     best = scene.with_values({"execution.how": "fused"})
-    return best.with_values({"execution.contact_tolerance": FINEST}) if _is_integrated(scene) else best
-
-
-def _is_integrated(scene: Scene) -> bool:
-    return any(not isinstance(stop, RestitutionStop | KelvinVoigtStop) for stop in scene.stops)
+    return (
+        best.with_values({"execution.contact_tolerance": FINEST})
+        if integrates_contacts(scene.stops)
+        else best
+    )
 
 
 def sensitivity_of(scene: Scene, scales: Scales) -> float:
@@ -132,8 +127,7 @@ def scales_of(scene: Scene, part: float = 1.0) -> Scales:
         begin, end = span_of(scene)
         return Scales(end - begin, (begin, end))
     window = window_of(scene, float_parameters(scene, None), part)
-    body = scene.body
-    masses = () if isinstance(body, BeamBody) else tuple(body.mass_at(stop.mass) for stop in scene.stops)
+    masses = tuple(body_points(scene).contact_masses().tolist()) if scene.body.HAS_MASSES else ()
     return Scales(scene.period or window[1] - window[0], window, masses)
 
 
@@ -147,7 +141,7 @@ def reference_of(scene: Scene) -> Reference:
     """
     if not scene.is_one_body:
         return _finest_exchange(scene)
-    scales, integrated, best = scales_of(scene), _is_integrated(scene), best_of(scene)
+    scales, integrated, best = scales_of(scene), integrates_contacts(scene.stops), best_of(scene)
     observation = observed(best)
     keys = disturbed_keys(best)
     disturbed = [_disturbed(best, key) for key in keys]
@@ -187,8 +181,8 @@ def _shallowness(scene: Scene, observation: Observation) -> float:
     fastest = float(np.abs(observation.impacts[:, 1]).max())
     rates = [
         abs(stop.position) * math.sqrt(stop.stiffness / mass)
-        for stop, mass in zip(scene.stops, contact_masses(scene), strict=True)
-        if isinstance(stop, KelvinVoigtStop)
+        for stop, mass in zip(scene.stops, body_points(scene).contact_masses(), strict=True)
+        if stop.law == "kelvin_voigt"
     ]
     return max(rates, default=0.0) / fastest if fastest > 0.0 else 0.0
 
@@ -249,7 +243,7 @@ def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Obse
     """Return the observation with the impacts of the P(1,1) motion in closed form, where that is what it does."""
     if scene.period is None or len(observation.impacts) < 2 or scene.forcing is None:
         return None
-    if not all(isinstance(stop, RestitutionStop) for stop in scene.stops):
+    if not all_rigid(scene.stops):
         return None
     try:
         oscillator = ImpactOscillator.from_scene(scene.text)

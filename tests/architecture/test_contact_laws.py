@@ -7,7 +7,8 @@ from pathlib import Path
 
 from vibroimpact.fmus.core import contact_laws
 from vibroimpact.fmus.packaging.build import NATIVE, read_components
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, RestitutionStop
+from vibroimpact.orchestrator.scene.laws import LAWS
+from vibroimpact.orchestrator.scene.models import STOP_MODELS
 
 TABLE = ("core/contact/contact_law.c", "core/contact/contact_law.h")
 #: Words for a law that are words for nothing else in the C: constants, names, and its number beside a sign.
@@ -49,8 +50,8 @@ def test_a_name_of_a_law_would_be_found() -> None:
 
 def test_scenes_have_the_laws_that_a_stop_evaluates_itself() -> None:
     own = {law.name: law.stop for law in contact_laws().values() if law.stop != "none" and not law.external}
-    assert set(STOP_MODELS) == set(own)
-    assert {name for name, model in STOP_MODELS.items() if model is RestitutionStop} == {
+    assert set(STOP_MODELS) == set(LAWS) == set(own)
+    assert {name for name, law in LAWS.items() if law.is_rigid} == {
         name for name, stop in own.items() if stop == "rigid"
     }
 

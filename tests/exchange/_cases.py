@@ -21,7 +21,7 @@ from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.orchestrator.run.export import export_scene
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, exported_floats, integer_parameters
+from vibroimpact.orchestrator.run.parameters import exported_floats, integer_parameters
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import dataset_name
@@ -256,7 +256,7 @@ def _by_importer(scene: Scene, names: list[str], case: Case, folder: Path) -> di
     """Return the outputs that no time series has, counts and impulses of contacts, by a run of our importer."""
     parameters = {**exported_floats(scene), **integer_parameters(scene)}
     tables = {
-        "component": {"body": {"fmu": FMU_NAMES[scene.body.kind], "parameters": parameters}},
+        "component": {"body": {"fmu": scene.body.FMU, "parameters": parameters}},
         "record": {
             "recorded_time": (case.count + 1) / case.rate,
             "variables": [f"body.{name}" for name in names],

@@ -15,7 +15,6 @@ from vibroimpact.analysis.dataset import Outcome, open_dataset
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.orchestrator.run.export import export_scene
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 
@@ -44,7 +43,7 @@ def check(seed: int) -> str | None:
         if run["outcome"].item() not in (Outcome.ok, Outcome.stuck):
             return f"{tables}: outcome {run['outcome'].item()}: {run['message'].item()}"
         path = export_scene(scene, folder / "rig.fmu", fmi=fmi, enumerations=draw.random() < 0.3)
-        again = export_fmu(FMU_NAMES[scene.body.kind], folder / "full.fmu", fmi=fmi, full=True)
+        again = export_fmu(scene.body.FMU, folder / "full.fmu", fmi=fmi, full=True)
         assert again.is_file()
         step = 1.0 / tables["record"]["time_series"]["rate"]
         done = simulate_fmu(

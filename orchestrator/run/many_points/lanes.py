@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.bodies import ModalPoints
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.orchestrator.run.many_points.loop import PreparedPoints
-from vibroimpact.orchestrator.run.many_points.modal import ModalPoints, modal_points
-from vibroimpact.orchestrator.run.parameters import integer_parameters
+from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ class LanePoints:
 def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
     """Return prepared points as C takes them; those that are no bodies of free modes have numbers that it leaves."""
     columns, count = points.columns, len(points.begin)
-    modal = modal_points(scene, columns, integer_parameters(scene))
+    modal = body_points(scene, columns).in_state_coordinates()
     stops, record = scene.stops, scene.record
     numbers = range(1, len(stops) + 1)
     none = np.zeros(count)

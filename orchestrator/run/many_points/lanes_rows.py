@@ -22,12 +22,11 @@ from vibroimpact.orchestrator.run.many_points.loop_rows import (
     ragged_of,
     run_loop,
 )
-from vibroimpact.orchestrator.run.parameters import oscillator_start
+from vibroimpact.orchestrator.run.parameters import free_state
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH, impact_rows, refuse_abandoned
 from vibroimpact.orchestrator.run.runner import CARRYING, next_start
 from vibroimpact.orchestrator.run.window import limit_message
-from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 
 ROWS_ROOM = 65_536
 """Rows of impacts and periods that the lanes write before Python takes them."""
@@ -136,7 +135,7 @@ class _LaneRun:
 
     def __init__(self, loop: PointLoop, values: LaneValues, points: PreparedPoints, alone: Alone) -> None:
         self._loop, self._values, self._points, self._alone = loop, values, points, alone
-        self._is_oscillator = isinstance(loop.scene.body, OscillatorBody)
+        self._is_structure = loop.scene.body.IS_STRUCTURE
         count, told = len(values), lane_points(loop.scene, points)
         self._plan, self._modal = told.plan, told.modal
         self._first = values.first if loop.chained else np.ones(count, dtype=np.bool_)
@@ -228,7 +227,7 @@ class _LaneRun:
         by_itself = [
             place
             for place, state in given.items()
-            if not self._is_oscillator or (state is None and not own[place])
+            if self._is_structure or (state is None and not own[place])
         ]
         for place in by_itself:
             self._answer(np.array([place]), columns_of([self._alone(place, given[place])]))
@@ -269,7 +268,7 @@ class _LaneRun:
         self._scalar.append((places, columns))
         ended = np.isin(columns.outcome, CARRYING)
         self._outcome[places] = np.where(ended, Outcome.ok, columns.outcome)
-        if self._is_oscillator:
+        if not self._is_structure:
             self._final_q[0, places], self._final_p[0, places] = (
                 columns.final_displacement,
                 columns.final_velocity,
@@ -295,14 +294,8 @@ class _LaneRun:
 
     def _free_start(self, place: int, state: State) -> State:
         """Return a carried state with what lies beyond a stop, which has moved, put on it."""
-        scene = self._loop.scene.at({key: float(each[place]) for key, each in self._values.values.items()})
-        if self._is_oscillator:
-            return tuple(oscillator_start(scene, state).values())
-        # what finds the shapes of a beam takes time to load
-        from vibroimpact.orchestrator.run.carried_state import on_free_side
-
-        assert isinstance(scene.body, BeamBody)  # no other structure has branches in lanes
-        return on_free_side(scene, scene.body, state)
+        values = {key: float(each[place]) for key, each in self._values.values.items()}
+        return free_state(self._loop.scene.at(values), state)
 
     # ---- what was recorded ----
 

@@ -20,9 +20,9 @@ from vibroimpact.orchestrator.run.parameters import float_parameters, state_vari
 from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY, TOUCH_DOWN, RecordedBody
 from vibroimpact.orchestrator.run.window import forced_window
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
 from vibroimpact.orchestrator.scene.keys import MODES
-from vibroimpact.orchestrator.scene.models import RestitutionStop
+from vibroimpact.orchestrator.scene.laws import LAWS
+from vibroimpact.orchestrator.scene.models import Stop
 
 SHORTEST_DEADLINE = 0.5
 """Deadline of a point below which the loop, which looks every few hundredths of a second, would be too coarse, s."""
@@ -81,7 +81,7 @@ def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop 
         or scene.is_measured
         or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
         or (deadline is not None and deadline < SHORTEST_DEADLINE)
-        or (chained and not (by_lanes or isinstance(scene.body, OscillatorBody)))
+        or (chained and scene.body.IS_STRUCTURE and not by_lanes)
     ):
         return None
     return PointLoop(scene, driver, by_lanes=by_lanes)
@@ -97,8 +97,7 @@ class PointLoop:
         touch_downs = [f"{port}.{name}" for port in ports for name in TOUCH_DOWN]
         others = [f"{port}.{name}" for name in ("stick_start", "force") for port in ports]
         finals = (*OBSERVED, *state_variables(scene), *others, *touch_downs)
-        is_oscillator = isinstance(scene.body, OscillatorBody)
-        self.finals = finals if is_oscillator else (*finals, "natural_angular_frequency[1]")
+        self.finals = (*finals, "natural_angular_frequency[1]") if scene.body.IS_STRUCTURE else finals
         self._kept: list[NDArray[Any]] = []  # what C reads while it runs
         instance = driver.instance
         functions = [instance.address_of(name) for name in core.RunsFmu.FUNCTIONS]
@@ -203,10 +202,10 @@ class PointLoop:
     def _alike(self, points: PointValues) -> Iterator[tuple[NDArray[np.intp] | slice, Mapping[str, Any]]]:
         """Yield points whose parameters are found together, and their values.
 
-        Of a beam those of one body: powers of numbers and of arrays, in its rigidity, may differ in their last bit.
+        Of a beam those of one body: see `TAKES_ARRAYS` of bodies.
         """
         own = [key for key in points.values if key.startswith("body.")]
-        if not (own and isinstance(self.scene.body, BeamBody)):
+        if not own or self.scene.body.TAKES_ARRAYS:
             yield slice(None), points.values
             return
         bodies, which = np.unique([points.values[key] for key in own], axis=1, return_inverse=True)
@@ -220,8 +219,8 @@ def _place(name: str, names: Sequence[str]) -> int:
     return names.index(name) if name in names else -1
 
 
-def _direction(stop: object) -> float:
+def _direction(stop: Stop) -> float:
     """Return where a rigid stop pushes a body back from; 0 for one that yields."""
-    if not isinstance(stop, RestitutionStop):
+    if not LAWS[stop.law].is_rigid:
         return 0.0
     return 1.0 if stop.side == "upper" else -1.0

@@ -30,7 +30,6 @@ from vibroimpact.orchestrator.run.record import (
     refuse_abandoned,
 )
 from vibroimpact.orchestrator.run.window import TWO_PI, late_message, limit_message, no_load_message
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
 LISTEN_SECONDS = 0.05
 """Time after which the loop lets Python hear signals, s; one step in it may take some hundredths of a second more."""
@@ -246,7 +245,7 @@ class LoopArrays:
         """As `point` says it: pressed for good (an oscillator), or at rest for long enough."""
         scene, columns, points = self._loop.scene, self._points.columns, self._points
         resting, count = rests.any(axis=1), len(rests)
-        if not isinstance(scene.body, OscillatorBody):
+        if scene.body.IS_STRUCTURE:
             starts = self._stick_starts(arrays)
             began = np.fmin.reduce(starts, axis=1)
             long_enough = points.end[:count] - points.begin[:count]

@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.run.parameters import float_parameters, state_vari
 from vibroimpact.orchestrator.run.record import OBSERVED, ROW_IMPACT, ROW_PERIOD
 from vibroimpact.orchestrator.run.window import forced_window
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.models import RestitutionStop
+from vibroimpact.orchestrator.scene.laws import LAWS
 
 PROBES = (2.0**-20, 0.0812537291, -0.0316227766, 1.4142135e-9)
 """Relative changes of a value, of all bits, that show what becomes of it."""
@@ -76,7 +76,7 @@ class OnePoint:
         self._has_impacts = record.impacts
         of_periods = enumerate(PERIOD_COLUMNS, start=2) if points.periods else ()
         self._periods = [(column, name) for column, name in of_periods if name not in form.omitted]
-        self._is_plain = record.each_period and all(isinstance(stop, RestitutionStop) for stop in stops)
+        self._is_plain = record.each_period and all(LAWS[stop.law].is_rigid for stop in stops)
         forcing = "forcing.angular_frequency", "forcing.phase"
         self._frequency, self._phase = map(names.index, forcing) if points.forced else (-1, -1)
 

@@ -20,16 +20,7 @@ Alone = Callable[[Mapping[str, float], State | None], RunRecord]
 def rows_of(
     loop: PointLoop, points: PointColumns, start: State | None, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None] | None:
-    """Run points by the loop in C or in lanes; None where they need Python in between, see `Runner.rows`.
-
-    Parameters
-    ----------
-    loop : PointLoop
-    points, start, deadline
-        As of `Runner.rows`.
-    alone : callable
-        Runs the points that neither takes.
-    """
+    """Run points by the loop in C or in lanes; None where they need Python in between, see `Runner.rows`."""
     if loop.by_lanes:
         return _lane_rows(loop, points, start, deadline, alone)
     prepared = None if points.starts else loop.prepared(PointValues(points.values, points.first))

@@ -12,9 +12,9 @@ from vibroimpact.fmus.core.measuring import EXCITER_SIDES, LoadCell, sensor_read
 from vibroimpact.fmus.core.stepping import Magnet
 from vibroimpact.orchestrator.run.fused import HeldExciter
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import LOAD_CELL, MEASURED_SENSOR, RING_INSTANTS
 from vibroimpact.orchestrator.scene.measuring_models import LoadCell as CellTable
-from vibroimpact.orchestrator.scene.models import RestitutionStop
 
 Floats = NDArray[np.float64]
 IMPACT_TIME, IMPACT_IMPULSE, IMPACT_CONTACT = 0, 3, 4
@@ -46,7 +46,7 @@ class MeasuringChain:
         self._readings = {name: MEASURED_SENSOR[name] for name in channels if name in MEASURED_SENSOR}
         self._force = f"contact[{cell.stop}].force" if cell else ""
         self.variables = tuple(dict.fromkeys((*self._readings.values(), *([self._force] if cell else []))))
-        self.needs_impacts = cell is not None and isinstance(scene.stops[cell.stop - 1], RestitutionStop)
+        self.needs_impacts = cell is not None and LAWS[scene.stops[cell.stop - 1].law].is_rigid
         self._cell = None if cell is None else _opened(cell)
 
     @property
@@ -146,6 +146,6 @@ def held_exciter(scene: Scene) -> HeldExciter | None:
     if exciter is None:
         return None
     magnet = Magnet(exciter.gain, exciter.offset, exciter.distance, EXCITER_SIDES[exciter.side])
-    # a beam has a sensor of its own where the force acts, see `parameters.beam_floats`
-    place = "sensor[1].displacement" if scene.body.kind == "beam" else "displacement"
+    # a beam has a sensor of its own where the force acts, see `parameters`
+    place = "sensor[1].displacement" if scene.body.PLACE == "location" else "displacement"
     return HeldExciter(magnet, place)

@@ -222,7 +222,7 @@ class MeasuredSession:
 
 
 def _refuse_no_plant(scene: Scene, channels: Sequence[str]) -> None:
-    if not scene.is_lone_body or scene.body.kind not in ("oscillator", "beam"):
+    if not scene.is_lone_body or not scene.body.CAN_BE_MEASURED:
         raise UsageError(
             f"{scene.source}: expected an oscillator or a beam with a measuring chain, got another scene."
         )

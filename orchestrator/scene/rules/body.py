@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from vibroimpact.orchestrator.scene.body_models import BeamBody, Body, ChainBody, OscillatorBody
+from vibroimpact.orchestrator.scene.body_models import Body
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
 from vibroimpact.orchestrator.scene.models import Forcing
-from vibroimpact.orchestrator.scene.places import moves
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.sampled_names import (
     channel_names,
@@ -27,24 +26,20 @@ FREQUENCY_KEYS = ("frequency", "mass_per_length")
 def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
     """Elements and start states of a chain count as its masses do, those of a beam as its modes."""
     body = draft.body
-    if body is None or isinstance(body, OscillatorBody):
+    if body is None or not body.IS_STRUCTURE:
         return
     for variable in fmu_variables_of(type(body)):
         if not variable.is_array:
             continue
         where, value = f"body.{variable.key}", getattr(body, variable.attribute)
-        if isinstance(body, ChainBody):
-            yield from _size_problem(where, value, body.size, "mass")
-        elif (
-            isinstance(value, tuple)
-            and value
-            and draft.sweeps_modes
-            and not is_array_only(field_of(BeamBody, variable.key))
-        ):
+        is_start = is_array_only(field_of(type(body), variable.key))
+        if not body.KEEPS_MODES:
+            yield from _size_problem(where, value, body.size, body.ELEMENT)
+        elif isinstance(value, tuple) and value and draft.sweeps_modes and not is_start:
             expected = "one number for all modes where it is not yet known how many there are"
             yield Problem(where, expected, f"an array of {len(value)}", "Write the number alone.")
-        elif not is_array_only(field_of(BeamBody, variable.key)):
-            yield from _size_problem(where, value, body.size, "mode")
+        elif not is_start:
+            yield from _size_problem(where, value, body.size, body.ELEMENT)
         elif len(value) > body.size:
             expected = f"at most {body.size} numbers, one for each mode"
             yield Problem(where, expected, f"an array of {len(value)}", "Those left out are 0.")
@@ -59,9 +54,9 @@ def _size_problem(key: str, value: object, size: int, of: str) -> Iterator[Probl
 
 def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
     """Rigidity and mass follow from the section and the material, or are given themselves."""
-    if not isinstance(draft.body, BeamBody):
-        return
     written = draft.written("body")
+    if not hasattr(draft.body, "flexural_rigidity"):
+        return
     section = [key for key in SECTION_KEYS if key in written]
     by_frequency = "frequency" in written
     way_without_section = FREQUENCY_KEYS if by_frequency else RIGIDITY_KEYS
@@ -83,18 +78,20 @@ def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
 def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
     """The mass or the point whose displacement is recorded is one of the body."""
     body = draft.body
-    if isinstance(body, ChainBody) and isinstance(body.modes, int) and body.modes > body.size:
-        expected = f"at most as many modes as masses, {body.size}"
-        yield Problem("body.modes", expected, str(body.modes), "Leave it out for all of them.")
-    if isinstance(body, ChainBody) and (body.observed_mass or 1) > body.size:
-        yield _no_such_mass("body.observed_mass", body, body.observed_mass or 0)
-    if "sensor" not in draft.document or body is None:
+    if body is None:
         return
-    if not isinstance(body, BeamBody):
+    if body.kept_modes > body.size:
+        expected = f"at most as many modes as masses, {body.size}"
+        yield Problem("body.modes", expected, str(body.kept_modes), "Leave it out for all of them.")
+    observed = getattr(body, "observed_mass", None)
+    if observed is not None and observed > body.size:
+        expected = f"a mass of the chain, 1 to {body.size}"
+        yield Problem("body.observed_mass", expected, str(observed), "Masses count from the ground.")
+    if "sensor" not in draft.document:
+        return
+    if body.PLACE != "location":
         if "location" in draft.written("sensor"):
-            hint = "Remove it" + (
-                "; observed_mass in [body] says which mass." if isinstance(body, ChainBody) else "."
-            )
+            hint = f"Remove it{body.SENSOR_HINT}."
             yield Problem(
                 "sensor.location", "a location in a scene of a beam", f"one beside {body.NAME}", hint
             )
@@ -103,19 +100,13 @@ def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
     yield from fixed_point_problems("sensor.location", body, span)
 
 
-def fixed_point_problems(key: str, body: BeamBody, span: tuple[float, float] | None) -> Iterator[Problem]:
+def fixed_point_problems(key: str, body: Body, span: tuple[float, float] | None) -> Iterator[Problem]:
     """Yield the problem of a point that does not move, of a location or the ends of its sweep."""
     for location in dict.fromkeys(span or ()):
-        if not moves(body, location):
-            end = "clamped end" if location == 0.0 else "supported far end"
-            expected = f"a point where a {body.boundary} beam moves"
+        fixed = body.fixed_point(location)
+        if fixed is not None:
+            expected, end = fixed
             yield Problem(key, expected, quoted(location), f"{quoted(location)} is the {end}.")
-
-
-def _no_such_mass(key: str, body: ChainBody, number: int) -> Problem:
-    return Problem(
-        key, f"a mass of the chain, 1 to {body.size}", str(number), "Masses count from the ground."
-    )
 
 
 def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
@@ -123,7 +114,7 @@ def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
     body, forcing = draft.body, draft.forcing
     if body is None or forcing is None:
         return
-    if forcing.kind in ("uniform", "mode") and not isinstance(body, BeamBody):
+    if forcing.kind not in body.FORCINGS:
         expected = f'"force" or "base_acceleration" for {body.NAME}'
         yield Problem("forcing.kind", expected, quoted(forcing.kind), "It is a load of a beam.")
         return
@@ -133,7 +124,7 @@ def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
 
 def _amplitude_problems(body: Body, forcing: Forcing) -> Iterator[Problem]:
     array = isinstance(forcing.amplitude, tuple)
-    if isinstance(body, ChainBody) and forcing.kind == "force":
+    if forcing.kind in body.AMPLITUDES:
         if array:
             yield from _size_problem("forcing.amplitude", forcing.amplitude, body.size, "mass")
         elif body.size > 1:
@@ -151,11 +142,11 @@ def _amplitude_problems(body: Body, forcing: Forcing) -> Iterator[Problem]:
 def _place_problems(draft: Draft, body: Body, forcing: Forcing) -> Iterator[Problem]:
     """Yield what is wrong with `location` and `mode`, each for one kind of load of a beam."""
     for key, kind in (("location", "force"), ("mode", "mode")):
-        wanted = isinstance(body, BeamBody) and forcing.kind == kind
+        wanted = body.FORCING_KEYS.get(key) == forcing.kind
         if key in draft.written("forcing") and not wanted:
             got = f"it beside {body.NAME} under {forcing.kind}"
             yield Problem(f"forcing.{key}", f'{key} for a beam with kind = "{kind}"', got, f"Remove {key}.")
-    if not isinstance(body, BeamBody):
+    if not body.FORCING_KEYS:
         return
     if forcing.kind == "force":
         yield from fixed_point_problems("forcing.location", body, draft.span("forcing.location"))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vibroimpact.orchestrator.scene.body_models import ChainBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
+from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import MOST_INSTANTS, RING_INSTANTS
-from vibroimpact.orchestrator.scene.models import RestitutionStop
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 
 NOISY = {"sensor": "sensor", "load_cell": "load_cell", "drive": "exciter"}
@@ -26,9 +25,10 @@ def chain_suits_the_scene(draft: Draft) -> Iterator[Problem]:
     tables = _written(draft)
     first = next((name for name in draft.channels if name.startswith("sensor.")), "")
     for where in tables or ((f"record.time_series: {first}",) if first else ()):
-        if isinstance(draft.body, ChainBody):
-            hint = "Its place on a chain is not known: remove it."
-            yield Problem(where, "a measuring chain of an oscillator or a beam", "one beside a chain", hint)
+        if draft.body is not None and not draft.body.CAN_BE_MEASURED:
+            name = draft.body.NAME
+            hint = f"Its place on {name} is not known: remove it."
+            yield Problem(where, "a measuring chain of an oscillator or a beam", f"one beside {name}", hint)
         elif draft.header and draft.header.units == "nondimensional":
             hint = 'Volts are SI: give the scene in units = "SI".'
             yield Problem(where, "a scene in SI units beside it", "a nondimensional one", hint)
@@ -65,7 +65,7 @@ def load_cell_has_a_stop(draft: Draft) -> Iterator[Problem]:
     stop, given = draft.stops[cell.stop - 1], draft.span("load_cell.contact_duration")
     if stop is None:
         return
-    rigid = isinstance(stop, RestitutionStop)
+    rigid = LAWS[stop.law].is_rigid
     if rigid and given is None:
         hint = "An impact on a rigid stop is seen as a half sine of this duration, s."
         yield Problem("load_cell.contact_duration", "a number > 0 of a rigid stop", "nothing", hint)

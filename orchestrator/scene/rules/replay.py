@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vibroimpact.orchestrator.scene.body_models import ChainBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint
@@ -39,7 +38,7 @@ def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
         yield Problem(
             f"replay.{key}", f"{key} beside {other}", "nothing", f"Add {key} = ..., or remove {other}."
         )
-    if replay.drive == "force" and isinstance(draft.body, ChainBody):
+    if replay.drive == "force" and draft.body is not None and "force" in draft.body.AMPLITUDES:
         hint = "A force on one mass is not replayed yet; the base's acceleration is."
         yield Problem("replay.drive", '"base_acceleration" for a chain', '"force"', hint)
     spans = [("replay.peaks", replay.peaks)] if replay.peaks is not None else []

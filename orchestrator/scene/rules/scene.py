@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES, MODES, START_STATE
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
@@ -79,7 +78,7 @@ def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
 
 def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
     body, stiffness = draft.body, draft.span("body.stiffness")
-    ratio = body.damping_ratio if isinstance(body, OscillatorBody) else None
+    ratio = getattr(body, "damping_ratio", None)
     if ratio is not None and stiffness and stiffness[0] == 0.0:
         hint = "The ratio is to 2 sqrt(stiffness mass); give damping instead."
         yield Problem(

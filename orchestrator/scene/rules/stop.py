@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody, OscillatorBody
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
 from vibroimpact.orchestrator.scene.draft import Draft
-from vibroimpact.orchestrator.scene.models import LAWS_THAT_YIELD, KelvinVoigtStop, RestitutionStop, Stop
-from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
+from vibroimpact.orchestrator.scene.laws import LAWS
+from vibroimpact.orchestrator.scene.models import LAWS_THAT_YIELD, Stop
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems
 
@@ -22,7 +22,7 @@ def stops_are_few(draft: Draft) -> Iterator[Problem]:
 
 def _most_stops(draft: Draft) -> int:
     kind = str(draft.written("body").get("kind", "oscillator"))
-    return BODY_MODELS.get(kind, OscillatorBody).MOST_STOPS
+    return BODY_MODELS.get(kind, BODY_MODELS["oscillator"]).MOST_STOPS
 
 
 def stops_are_on_the_body(draft: Draft) -> Iterator[Problem]:
@@ -35,20 +35,18 @@ def stops_are_on_the_body(draft: Draft) -> Iterator[Problem]:
 
 
 def _place_problems(draft: Draft, body: Body, stop: Stop, where: str) -> Iterator[Problem]:
-    if stop.mass is not None and not isinstance(body, ChainBody):
-        hint = "Say where on the beam by location." if isinstance(body, BeamBody) else "Remove mass."
-        yield Problem(f"{where}.mass", "mass for a chain", f"it beside {body.NAME}", hint)
-    if stop.location is not None and not isinstance(body, BeamBody):
-        hint = "Say which mass by mass." if isinstance(body, ChainBody) else "Remove location."
-        yield Problem(f"{where}.location", "location for a beam", f"it beside {body.NAME}", hint)
-    if isinstance(body, ChainBody) and stop_mass(body, stop) > body.size:
+    for key, owner in (("mass", "a chain"), ("location", "a beam")):
+        if getattr(stop, key) is not None and key != body.PLACE:
+            hint = body.PLACE_HINT or f"Remove {key}."
+            yield Problem(f"{where}.{key}", f"{key} for {owner}", f"it beside {body.NAME}", hint)
+    if body.PLACE == "mass" and body.place_of(stop) > body.size:
         expected = f"a mass of the chain, 1 to {body.size}"
         yield Problem(f"{where}.mass", expected, str(stop.mass), "Masses count from the ground.")
-    if isinstance(body, BeamBody):
-        span = draft.span(f"{where}.location")
-        if span is None and body.boundary != "clamped-free":
-            hint = f"Add location = ... to [[stop]]: the far end of a {body.boundary} beam does not move."
-            yield Problem(f"{where}.location", "a number between 0 and 1", "nothing", hint)
+    span = draft.span(f"{where}.location")
+    if span is None and body.fixed_end:
+        hint = f"Add location = ... to [[stop]]: {body.fixed_end}."
+        yield Problem(f"{where}.location", "a number between 0 and 1", "nothing", hint)
+    if span is not None:
         yield from fixed_point_problems(f"{where}.location", body, span)
 
 
@@ -58,7 +56,7 @@ def stops_leave_room(draft: Draft) -> Iterator[Problem]:
         return
     for first, second in combinations(range(len(draft.stops)), 2):
         one, other = draft.stops[first], draft.stops[second]
-        if one is None or other is None or _place(draft.body, one) != _place(draft.body, other):
+        if one is None or other is None or draft.body.place_of(one) != draft.body.place_of(other):
             continue
         if one.side == other.side:
             yield from _same_side_problems(draft, first, second, one.side)
@@ -67,22 +65,16 @@ def stops_leave_room(draft: Draft) -> Iterator[Problem]:
             yield from _room_problems(draft, upper, lower)
 
 
-def _place(body: Body, stop: Stop) -> float:
-    """Return what tells the places of two stops on a body apart."""
-    if isinstance(body, ChainBody):
-        return stop_mass(body, stop)
-    return stop_location(stop) if isinstance(body, BeamBody) else 0.0
-
-
 def _same_side_problems(draft: Draft, first: int, second: int, side: str) -> Iterator[Problem]:
-    if not isinstance(draft.body, OscillatorBody) and not _hides(draft, first, second):
+    is_structure = draft.body is None or draft.body.IS_STRUCTURE
+    if is_structure and not _hides(draft, first, second):
         return
     hint = "Motion never reaches the farther of two stops on one side: remove it."
-    if isinstance(draft.body, OscillatorBody):
-        expected, got = "one upper and one lower stop", f"two {side} stops"
-    else:
+    if is_structure:
         expected = f"another place or side than that of stop[{first + 1}]"
         got = f"two {side} stops at one place, the nearer one rigid"
+    else:
+        expected, got = "one upper and one lower stop", f"two {side} stops"
     yield Problem(f"stop[{second + 1}].side", expected, got, hint)
 
 
@@ -90,7 +82,7 @@ def _hides(draft: Draft, first: int, second: int) -> bool:
     """Whether one of two stops on one side is rigid and, at the worst, the nearer one."""
     for near, far in ((first, second), (second, first)):
         stop = draft.stops[near]
-        if not isinstance(stop, RestitutionStop):
+        if stop is None or not LAWS[stop.law].is_rigid:
             continue
         rigid, other = _position(draft, near), _position(draft, far)
         if rigid[0] <= other[1] if stop.side == "upper" else rigid[1] >= other[0]:
@@ -120,7 +112,7 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
     Of a beam that starts bent the displacement at a stop is known to its FMU alone, which refuses it then.
     """
     for index, stop in enumerate(draft.stops):
-        if not isinstance(stop, RestitutionStop):
+        if stop is None or not LAWS[stop.law].is_rigid:
             continue
         key, start = _start(draft, stop)
         if start is None:
@@ -141,14 +133,14 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
 def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:
     """Return the key of the start displacement at a stop, and its lowest and highest value."""
     body, key = draft.body, "body.displacement_start"
-    if isinstance(body, OscillatorBody):
-        return key, draft.span(key)
-    if body is None or not body.displacement_start:
-        return key, None if body is None else (0.0, 0.0)
-    if isinstance(body, BeamBody):
+    if body is None:
         return key, None
-    element = f"{key}[{stop_mass(body, stop)}]"
-    return element, draft.span(element)
+    if body.IS_STRUCTURE and not body.displacement_start:
+        return key, (0.0, 0.0)
+    if body.PLACE == "location":
+        return key, None
+    key = f"{key}[{body.place_of(stop)}]" if body.PLACE else key
+    return key, draft.span(key)
 
 
 def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
@@ -157,7 +149,7 @@ def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
         return
     for number, stop in enumerate(draft.stops, start=1):
         key = f"stop[{number}].relaxation_time"
-        if isinstance(stop, KelvinVoigtStop) and (draft.span(key) or (0.0, 0.0))[1] > 0.0:
+        if hasattr(stop, "relaxation_time") and (draft.span(key) or (0.0, 0.0))[1] > 0.0:
             hint = 'Run it fused: how = "fused", or relaxation_time = 0.'
             yield Problem(key, 'a surface that relaxes at once beside how = "coupled"', "a time", hint)
 
@@ -165,16 +157,16 @@ def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
 def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
     """A rigid stop meets the mass of all modes, which falls to none as they grow in number: equations.md 6.6."""
     body = draft.body
-    if not isinstance(body, BeamBody) or not body.residual:
+    if body is None or not body.has_residual_vectors:
         return
     stops = [stop for stop in draft.stops if stop is not None]
     for number, stop in enumerate(draft.stops, start=1):
-        if isinstance(stop, RestitutionStop):
+        if stop is not None and LAWS[stop.law].is_rigid:
             hint = f"Use law = {LAWS_THAT_YIELD}."
             yield Problem(
                 f"stop[{number}].law", "a stop that yields beside residual = true", "a rigid one", hint
             )
-    places = len({stop_location(stop) for stop in stops})
+    places = len({body.place_of(stop) for stop in stops})
     span = draft.span("body.modes")
     fewest = body.size if span is None else int(span[0])
     if fewest <= places:
@@ -188,10 +180,11 @@ def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
 
 def modes_that_are_found_converge(draft: Draft) -> Iterator[Problem]:
     """On a beam with a rigid stop nothing converges: the mass that it meets falls as 1 / modes, equations.md 6.6."""
-    if not draft.finds_modes:
+    body = draft.body
+    if body is None or not body.finds_modes:
         return
     for number, stop in enumerate(draft.stops, start=1):
-        if isinstance(stop, RestitutionStop) and isinstance(draft.body, BeamBody):
+        if stop is not None and LAWS[stop.law].is_rigid and not body.HAS_MASSES:
             hint = (
                 f"The mass that a rigid stop meets falls as 1 / modes: use law = {LAWS_THAT_YIELD}, or say how many "
                 "modes."

@@ -10,10 +10,8 @@ from typing import Any
 import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
 from vibroimpact.fmus.messages import Argument, message
-from vibroimpact.orchestrator.run.carried_state import on_free_side
-from vibroimpact.orchestrator.run.parameters import oscillator_start
+from vibroimpact.orchestrator.run.parameters import free_state
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.study.accuracy.budget import Budget
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, errors_of
 from vibroimpact.orchestrator.study.observation import LATE, Observation
@@ -164,13 +162,12 @@ def _no_transient(scene: Scene) -> Mapping[str, Any]:
 def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
     """Return a scene that starts with a state, at forcing phase 0; None where no scene says it."""
     changes: dict[str, Any] = dict(_no_transient(scene))
-    if isinstance(scene.body, OscillatorBody):
-        start = oscillator_start(scene, state)
-        changes |= {f"body.{name}": value for name, value in start.items()}
-    else:
-        free = on_free_side(scene, scene.body, state)
-        half = len(free) // 2
-        changes |= {"body.displacement_start": list(free[:half]), "body.velocity_start": list(free[half:])}
+    free = free_state(scene, state)
+    half = len(free) // 2
+    start = (list(free[:half]), list(free[half:])) if scene.body.IS_STRUCTURE else free
+    changes |= {
+        f"body.{name}_start": value for name, value in zip(("displacement", "velocity"), start, strict=True)
+    }
     if scene.forcing is not None and scene.period is not None:
         changes["forcing.phase"] = 0.0
     try:

@@ -8,17 +8,16 @@ from typing import Any
 
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.importer.component import description_of
+from vibroimpact.orchestrator.run.limits import why_not_pushed, why_not_thrown_back
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody
-from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, RestitutionStop
+from vibroimpact.orchestrator.scene.laws import all_rigid, any_rigid, integrates_contacts
 from vibroimpact.orchestrator.study.ways.models import other_models, other_modes
 from vibroimpact.orchestrator.study.ways.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of
 from vibroimpact.orchestrator.study.ways.revision import RevisedTrial
 from vibroimpact.orchestrator.study.ways.sampled import SampledTrial
-from vibroimpact.orchestrator.study.ways.strangers import why_not_pushed, why_not_thrown_back
 from vibroimpact.orchestrator.study.ways.trials import CoupledTrial, ModelExchangeTrial
 from vibroimpact.orchestrator.study.ways.way import Opener, Trial, Way, time_scale, way_by_scene
 
@@ -84,13 +83,12 @@ def remarks_on(scene: Scene) -> list[str]:
     plain = scene.is_lone_body and scene.stops
     if plain:
         remarks += _remarks_on_strangers(scene)
-    rigid = any(isinstance(stop, RestitutionStop) for stop in scene.stops)
-    if plain and isinstance(scene.body, BeamBody):
+    if plain and not scene.body.HAS_MASSES:
         remarks.append(
             "stops of other laws: the mass that hits a stop is that of the modes, and with it restitution depends on "
             "their number"
         )
-    if rigid and isinstance(scene.body, BeamBody):
+    if scene.is_one_body and not scene.body.HAS_MASSES and any_rigid(scene.stops):
         remarks.append(
             "number of modes: nothing converges, since the contact mass of a rigid stop on a beam falls with the "
             "number of modes and its restitution has no meaning without it (docs/contact_laws.md); compliant stops do"
@@ -101,9 +99,9 @@ def remarks_on(scene: Scene) -> list[str]:
 def _remarks_on_strangers(scene: Scene) -> list[str]:
     """Return which ways with a body that knows nothing of its stops are left out, and why."""
     pushed = why_not_pushed(scene)
-    rigid = [isinstance(stop, RestitutionStop) for stop in scene.stops]
-    thrown_back = why_not_thrown_back(scene) if all(rigid) else pushed
-    if any(rigid) and not all(rigid):
+    rigid = all_rigid(scene.stops)
+    thrown_back = why_not_thrown_back(scene) if rigid else pushed
+    if any_rigid(scene.stops) and not rigid:
         thrown_back = "some stops are rigid and others yield"
     if pushed and pushed == thrown_back:
         return [f"plain steps of equal size and step revision: {pushed}"]
@@ -122,7 +120,7 @@ def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
 
 def _fused(scene: Scene) -> list[Way]:
     how = {"execution.how": "fused"}
-    if not _integrates_contacts(scene):
+    if not integrates_contacts(scene.stops):
         return [way_by_scene("fused", "", math.nan, scene, how)]
     return [
         way_by_scene(
@@ -135,7 +133,7 @@ def _fused(scene: Scene) -> list[Way]:
 def _coupled(scene: Scene) -> list[Way]:
     if not scene.stops or _has_memory(scene):
         return []
-    yields = any(not isinstance(stop, RestitutionStop) for stop in scene.stops)
+    yields = not all_rigid(scene.stops)
     ways = []
     for version in ("3.0", "2.0"):
         name = f"coupled, FMI {version}"
@@ -184,7 +182,7 @@ def _revised(scene: Scene) -> list[Way]:
     if not scene.stops or why_not_pushed(scene) or _has_memory(scene):
         return []
     scale, name = time_scale(scene), "step revision"
-    if all(isinstance(stop, RestitutionStop) for stop in scene.stops):
+    if all_rigid(scene.stops):
         steps = [part * scale for part in REVISED_STEPS]
         return [Way(name, "step", step, {}, _opens(RevisedTrial, scene, step)) for step in steps]
     longest = REVISED_STEPS[0] * scale
@@ -209,9 +207,9 @@ def _plain_steps(scene: Scene) -> list[Way]:
     """Steps of equal size, as an importer makes them that knows no events."""
     scale = time_scale(scene)
     ways = []
-    rigid = [isinstance(stop, RestitutionStop) for stop in scene.stops]
-    turned = bool(rigid) and all(rigid) and not why_not_thrown_back(scene)
-    pushed = bool(rigid) and not (any(rigid) or why_not_pushed(scene) or _has_memory(scene))
+    stops = scene.stops
+    turned = bool(stops) and all_rigid(stops) and not why_not_thrown_back(scene)
+    pushed = bool(stops) and not (any_rigid(stops) or why_not_pushed(scene) or _has_memory(scene))
     for count in STEPS_A_PERIOD:
         step = scale / count
         if turned:
@@ -281,7 +279,3 @@ def _not_repeated(scene: Scene) -> list[str]:
 def _has_memory(scene: Scene) -> bool:
     """Whether a stop relaxes, which is a law of the body's own FMU alone."""
     return any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops)
-
-
-def _integrates_contacts(scene: Scene) -> bool:
-    return any(not isinstance(stop, RestitutionStop | KelvinVoigtStop) for stop in scene.stops)

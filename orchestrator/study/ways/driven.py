@@ -22,15 +22,6 @@ from vibroimpact.orchestrator.study.ways.span import window_of
 class DrivenTrial:
     """A body and its stops, fused or coupled as the scene says, over the first part of its time.
 
-    Parameters
-    ----------
-    scene : Scene
-        Of the short form, without a sweep.
-    part : float
-        0 < part <= 1.
-    wrap : callable or None
-        Wraps the functions of the FMUs.
-
     Attributes
     ----------
     start : tuple of float

@@ -6,14 +6,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from vibroimpact.orchestrator.scene.models import (
-    HertzStop,
-    HuntCrossleyStop,
-    KelvinVoigtStop,
-    RestitutionStop,
-    StopTable,
-)
+from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, Stop
 
+OfLaw = Callable[[Any, float, float], float]
+"""What a stop of one law does to a mass (kg) that touches it with a speed (m/s)."""
 LEAST_RESTITUTION = 0.01
 """Coefficient of restitution below which no law that yields stands for another."""
 MOST_RATIO = 100.0
@@ -28,29 +24,32 @@ POWER_LAW_TIME = 3.218065
 """Contact time of a Hertz stop over (mass^2 / (stiffness^2 speed))^(1/5)."""
 
 
-def restitution_at(stop: StopTable, mass: float, speed: float) -> float:
+def restitution_at(stop: Stop, mass: float, speed: float) -> float:
     """Return the coefficient of restitution that a stop gives a rigid mass; NaN for a law that none is known of.
 
     Parameters
     ----------
-    stop : StopTable
+    stop : Stop
     mass : float
         kg.
     speed : float
         Of the mass when it touches the stop, m/s.
     """
-    match stop:
-        case RestitutionStop():
-            return stop.restitution if stop.yield_velocity == 0.0 else math.nan
-        case KelvinVoigtStop():
-            if stop.relaxation_time > 0.0:
-                return math.nan
-            return restitution_of(stop.damping / (2.0 * math.sqrt(stop.stiffness * mass)))
-        case HertzStop():
-            return 1.0
-        case HuntCrossleyStop():
-            return restitution_of_product(stop.damping * speed)
-    return math.nan
+    return _RESTITUTIONS[stop.law](stop, mass, speed)
+
+
+def _restitution_of_kelvin_voigt(stop: KelvinVoigtStop, mass: float, speed: float) -> float:
+    if stop.relaxation_time > 0.0:
+        return math.nan
+    return restitution_of(stop.damping / (2.0 * math.sqrt(stop.stiffness * mass)))
+
+
+_RESTITUTIONS: dict[str, OfLaw] = {
+    "restitution": lambda stop, mass, speed: stop.restitution if stop.yield_velocity == 0.0 else math.nan,
+    "kelvin_voigt": _restitution_of_kelvin_voigt,
+    "hertz": lambda stop, mass, speed: 1.0,
+    "hunt_crossley": lambda stop, mass, speed: restitution_of_product(stop.damping * speed),
+}
 
 
 def laws_of_equal_restitution(
@@ -87,22 +86,22 @@ def laws_of_equal_restitution(
     return laws
 
 
-def contact_time(stop: StopTable, mass: float, speed: float) -> float:
-    """Return how long a rigid mass touches a stop, s; of a power law as if it had no damping; 0 of a rigid one.
+def contact_time(stop: Stop, mass: float, speed: float) -> float:
+    """Return how long a rigid mass touches a stop, s; of a power law as if it had no damping; 0 of a rigid one."""
+    return _CONTACT_TIMES[stop.law](stop, mass, speed)
 
-    NaN for a law that none is known of.
-    """
-    match stop:
-        case RestitutionStop():
-            return 0.0
-        case KelvinVoigtStop():
-            rate = math.sqrt(stop.stiffness / mass)
-            return _angle(stop.damping / (2.0 * mass * rate)) / rate
-        case HertzStop():
-            return _power_law_time(1.5, stop.stiffness, mass, speed)
-        case HuntCrossleyStop():
-            return _power_law_time(stop.exponent, stop.stiffness, mass, speed)
-    return math.nan
+
+def _time_of_kelvin_voigt(stop: KelvinVoigtStop, mass: float, speed: float) -> float:
+    rate = math.sqrt(stop.stiffness / mass)
+    return _angle(stop.damping / (2.0 * mass * rate)) / rate
+
+
+_CONTACT_TIMES: dict[str, OfLaw] = {
+    "restitution": lambda stop, mass, speed: 0.0,
+    "kelvin_voigt": _time_of_kelvin_voigt,
+    "hertz": lambda stop, mass, speed: _power_law_time(1.5, stop.stiffness, mass, speed),
+    "hunt_crossley": lambda stop, mass, speed: _power_law_time(stop.exponent, stop.stiffness, mass, speed),
+}
 
 
 def _power_law_time(exponent: float, stiffness: float, mass: float, speed: float) -> float:

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
-from vibroimpact.orchestrator.scene.models import RestitutionStop, Stop
+from vibroimpact.orchestrator.scene.laws import any_rigid
+from vibroimpact.orchestrator.scene.models import Stop
 from vibroimpact.orchestrator.study.ways.equal_restitution import (
     LEAST_RESTITUTION,
     contact_time,
@@ -39,12 +40,12 @@ def other_models(scene: Scene, speed: float) -> list[Way]:
     body, ways = scene.body, []
     if scene.stops:
         ways += other_modes(scene)
-    if isinstance(body, BeamBody) and any(isinstance(stop, RestitutionStop) for stop in scene.stops):
-        other = "collocation" if body.impact_projection == "variational" else "variational"
+    if not body.HAS_MASSES and any_rigid(scene.stops):
+        other = "collocation" if body.projection == "variational" else "variational"
         change = {"body.impact_projection": other}
         ways.append(way_by_scene(f"{other} projection", "", math.nan, scene, change, model=True))
-    if not isinstance(body, BeamBody) and scene.stops:
-        ways += _equal_restitution(scene, body, speed)
+    if body.HAS_MASSES and scene.stops:
+        ways += _equal_restitution(scene, speed)
     return ways
 
 
@@ -54,9 +55,9 @@ def other_modes(scene: Scene) -> list[Way]:
     They are told by the most of them. With rigid stops on a beam nothing converges, and none is shown.
     """
     body = scene.body
-    if isinstance(body, ChainBody):
-        return _fewer_modes(scene, body)
-    if not isinstance(body, BeamBody) or any(isinstance(stop, RestitutionStop) for stop in scene.stops):
+    if body.HAS_MASSES:
+        return _fewer_modes(scene) if body.size > 1 else []
+    if any_rigid(scene.stops):
         return []
     most = max(LEAST_TRIED_MODES, 4 * body.size)
     counts = sorted({n for n in MODES_TRIED if n <= most} | {body.size})
@@ -81,10 +82,10 @@ def other_modes(scene: Scene) -> list[Way]:
     ]
 
 
-def _fewer_modes(scene: Scene, body: ChainBody) -> list[Way]:
+def _fewer_modes(scene: Scene) -> list[Way]:
     """Return fewer modes of a chain, whose reference has all of them."""
-    whole = scene.with_values({"body.modes": body.size})
-    changes = [{"body.modes": n} for n in MODES_TRIED if n < body.size]
+    changes = [{"body.modes": n} for n in MODES_TRIED if n < scene.body.size]
+    whole = scene.with_values({"body.modes": scene.body.size})
     return [
         replace(
             way_by_scene("modes", "modes", change["body.modes"], scene, change, model=True), against=whole
@@ -102,18 +103,18 @@ def told_by(ways: Sequence[Way]) -> str:
     ways : sequence of Way
     """
     finest = next((way.against.body for way in ways if way.against is not None), None)
-    if isinstance(finest, ChainBody):
-        return f"all {finest.size} modes"
-    if not isinstance(finest, BeamBody):
+    if finest is None:
         return ""
-    what = ", residual vectors among them" if finest.residual else ""
+    if finest.HAS_MASSES:
+        return f"all {finest.size} modes"
+    what = ", residual vectors among them" if finest.has_residual_vectors else ""
     return f"{finest.size} modes{what}"
 
 
-def _equal_restitution(scene: Scene, body: OscillatorBody | ChainBody, speed: float) -> Iterator[Way]:
+def _equal_restitution(scene: Scene, speed: float) -> Iterator[Way]:
     """Yield stops of other laws that give the mass that hits them the same coefficient of restitution."""
     stops: Sequence[Stop] = scene.stops
-    masses = [body.mass_at(stop.mass) for stop in stops]
+    masses = body_points(scene).contact_masses().tolist()
     if not speed > 0.0:
         speed = 1.0  # at which nothing hits: of a law that depends on it, any
     found = [restitution_at(stop, mass, speed) for stop, mass in zip(stops, masses, strict=True)]

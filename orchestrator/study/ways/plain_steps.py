@@ -11,10 +11,9 @@ from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.importer.component import Component, Value
 from vibroimpact.orchestrator.run.coupled import stop_of, stop_parameters
 from vibroimpact.orchestrator.run.fused import BodyDriver
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.models import RestitutionStop
 from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
 from vibroimpact.orchestrator.study.ways.span import window_of
 from vibroimpact.orchestrator.study.ways.strangers import stranger_of, thrown_back
@@ -52,21 +51,10 @@ class _Seen:
 
 
 class PlainStepsTrial:
-    """A body on rigid stops that is looked at after steps of equal size, as an importer without events does.
+    """A body on rigid stops that is looked at after steps (s) of equal size, as an importer without events does.
 
     Where it is found beyond a stop its velocity there is turned round, all of its state otherwise kept: by an impulse
     at that point. Between two such corrections its motion is exact: all of the error is that of the steps.
-
-    Parameters
-    ----------
-    scene : Scene
-        With rigid stops.
-    step : float
-        Its size, s.
-    wrap : callable or None
-        Wraps the functions of the FMU.
-    part : float
-        Part of the scene's time that is simulated.
     """
 
     def __init__(self, scene: Scene, step: float, wrap: Wrapper | None = None, part: float = 1.0) -> None:
@@ -75,8 +63,8 @@ class PlainStepsTrial:
         stranger = stranger_of(scene)
         self._floats = stranger.floats
         of = None if wrap is None else (lambda name: wrap)
-        self._driver = BodyDriver(self._floats, stranger.integers, FMU_NAMES[scene.body.kind], wrap=of)
-        self._stops = [s for s in scene.stops if isinstance(s, RestitutionStop)]
+        self._driver = BodyDriver(self._floats, stranger.integers, scene.body.FMU, wrap=of)
+        self._stops = [s for s in scene.stops if s.law == "restitution"]
         self._signs = [1.0 if stop.side == "upper" else -1.0 for stop in self._stops]
         self._velocity_starts, self._changes = thrown_back(scene)
         self._starts = [n.replace("velocity", "displacement") for n in self._velocity_starts]
@@ -128,22 +116,10 @@ class PlainStepsTrial:
 
 
 class PlainForcesTrial:
-    """A body and its yielding stops, each an FMU, that exchange motion and force after steps of equal size.
+    """A body and its yielding stops, each an FMU, that exchange motion and force after steps (s) of equal size.
 
-    What a tool does that knows no events: the stop's force is held over a step.
-
-    Parameters
-    ----------
-    scene : Scene
-        With yielding stops.
-    exchange : str
-        `jacobi`: the stop sees the motion at the start of a step. `gauss_seidel`: that at its end.
-    step : float
-        Its size, s.
-    wrap : callable or None
-        Wraps the functions of the FMUs.
-    part : float
-        Part of the scene's time that is simulated.
+    What a tool does that knows no events: the stop's force is held over a step. With the exchange `jacobi` the stop
+    sees the motion at the start of a step, with `gauss_seidel` that at its end.
     """
 
     def __init__(
@@ -158,7 +134,7 @@ class PlainForcesTrial:
         )
         self._floats = stranger.floats
         of = None if wrap is None else (lambda name: wrap)
-        self._driver = BodyDriver(self._floats, stranger.integers, FMU_NAMES[scene.body.kind], wrap=of)
+        self._driver = BodyDriver(self._floats, stranger.integers, scene.body.FMU, wrap=of)
         inputs = list(dict.fromkeys(stranger.forces))
         self._pushed = [inputs.index(name) for name in stranger.forces]
         self._force = self._driver.inputs(inputs)

@@ -30,16 +30,7 @@ LEAST_SAMPLES = 64
 
 
 class ReplayTrial:
-    """A replay of the first recording that a scene names.
-
-    Parameters
-    ----------
-    scene : Scene
-        With `[replay]`.
-    every : int
-        Keep one of so many samples of each channel.
-    part : float
-        Part of the time of the replay that is simulated.
+    """A replay of the first recording that a scene names, with one of `every` samples of each channel.
 
     Raises
     ------

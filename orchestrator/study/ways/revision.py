@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.importer.events import Event
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopContactSpec
 from vibroimpact.orchestrator.run.coupled import BODY, stop_name, stop_of, stop_parameters
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.observation import LATE, Observation
@@ -26,21 +26,9 @@ from vibroimpact.orchestrator.study.ways.strangers import stranger_of
 class RevisedTrial:
     """A body that knows nothing of its stops, as the FMU of another tool: the `[[contact]]` of general scenes.
 
-    Steps that end beyond a stop are made again until they end at it; a stop that yields answers with the force, held
-    over each step, that closes the energy of the contact; a rigid one throws the body back over a very short step.
-
-    Parameters
-    ----------
-    scene : Scene
-        With stops, where a force can act on its body at each of them.
-    step : float
-        Longest step, s.
-    contact_steps : float
-        Steps in a contact with a stop that yields.
-    wrap : callable or None
-        Wraps the functions of the FMUs.
-    part : float
-        Part of the scene's time that is simulated.
+    Steps (at most `step`, s) that end beyond a stop are made again until they end at it; a stop that yields answers
+    with the force, held over each step, that closes the energy of the contact, in `contact_steps` steps; a rigid one
+    throws the body back over a very short step.
     """
 
     def __init__(
@@ -61,7 +49,7 @@ class RevisedTrial:
         }
         self._values |= {target: floats[source] for target, source in stop_parameters(count, floats).items()}
         own = {name: value for name, value in stranger.integers.items() if name != "impact_limit"}
-        body = ComponentSpec(BODY, fmu_path(FMU_NAMES[scene.body.kind]), own)
+        body = ComponentSpec(BODY, fmu_path(scene.body.FMU), own)
         at = zip(stranger.displacements, stranger.velocities, stranger.forces, strict=True)
         contacts = [StopContactSpec(BODY, *names, stop_name(k)) for k, names in enumerate(at, start=1)]
         self._importer = Importer(

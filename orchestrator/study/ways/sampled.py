@@ -15,20 +15,9 @@ from vibroimpact.orchestrator.study.ways.span import first_periods
 
 
 class SampledTrial:
-    """A scene whose impacts and extremes are read off samples of its motion.
+    """A scene whose impacts and extremes are read off samples of its motion, `rate` a second, in whole periods.
 
     An impact is where the last sample before it is, with the velocity there: what a recording tells without a model.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of the short form.
-    rate : float
-        Samples per s.
-    wrap : callable or None
-        Wraps the functions of the FMUs.
-    part : float
-        Part of the scene's recording that is simulated, in whole periods.
     """
 
     def __init__(self, scene: Scene, rate: float, wrap: Wrapper | None = None, part: float = 1.0) -> None:

@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.run.coupled import (
     stop_of,
     stop_parameters,
 )
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
@@ -40,26 +40,14 @@ LOST = 1e3
 
 
 class CoupledTrial:
-    """The body and its stops, each an FMU of one version of FMI.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of the short form.
-    version : str
-        `3.0` or `2.0`, of all components.
-    wrap : callable or None
-        Wraps the functions of the FMUs.
-    part : float
-        Part of the scene's time that is simulated.
-    """
+    """The body and its stops, each an FMU of one version of FMI, `3.0` or `2.0`."""
 
     def __init__(self, scene: Scene, version: str, wrap: Wrapper | None = None, part: float = 1.0) -> None:
         self._scene = scene
         self._floats, integers = float_parameters(scene, None), integer_parameters(scene)
         self._window = window_of(scene, self._floats, part)
         stops = len(scene.stops)
-        body = ComponentSpec(BODY, fmu_path(FMU_NAMES[scene.body.kind], version), body_integers(integers))
+        body = ComponentSpec(BODY, fmu_path(scene.body.FMU, version), body_integers(integers))
         links = connections_of(stops)
         step = scene.execution.macro_step
         self._importer = Importer(
@@ -134,18 +122,9 @@ class CoupledTrial:
 
 
 class ModelExchangeTrial:
-    """The body's FMU for model exchange, integrated by FMPy's CVode.
+    """The body's FMU for model exchange, integrated by FMPy's CVode to a relative tolerance.
 
-    Parameters
-    ----------
-    scene : Scene
-        Of the short form.
-    tolerance : float
-        Of the integrator, relative.
-    wrap : callable or None
-        Not used: FMPy calls the FMU itself, and nobody counts its calls.
-    part : float
-        Part of the scene's time that is simulated.
+    FMPy calls the FMU itself, and nobody counts its calls: `wrap` is not used.
     """
 
     def __init__(
@@ -155,7 +134,7 @@ class ModelExchangeTrial:
         self._deadline = Deadline()
         self._floats = float_parameters(scene, None)
         self._values = self._floats | integer_parameters(scene)
-        self._fmu = fmu_path(FMU_NAMES[scene.body.kind])
+        self._fmu = fmu_path(scene.body.FMU)
 
     def run(self) -> Observation:
         """Simulate the scene once."""

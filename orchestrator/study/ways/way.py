@@ -12,8 +12,8 @@ from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.run import open_runner
+from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.study.observation import Observation, observation_of
 from vibroimpact.orchestrator.study.ways.driven import DrivenTrial
 from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
@@ -148,7 +148,7 @@ def time_scale(scene: Scene) -> float:
     """Return the forcing period, or that of the slowest motion of an unforced oscillator, or a hundredth, s."""
     if scene.period is not None:
         return scene.period
-    body = scene.body
-    if isinstance(body, OscillatorBody) and body.stiffness > 0.0:
-        return 2.0 * math.pi * math.sqrt(body.mass / body.stiffness)
+    numbers = {} if scene.body.IS_STRUCTURE else float_parameters(scene, None)
+    if numbers.get("stiffness", 0.0) > 0.0:
+        return 2.0 * math.pi * math.sqrt(numbers["mass"] / numbers["stiffness"])
     return (scene.record.transient_time + scene.record.recorded_time) / 100.0

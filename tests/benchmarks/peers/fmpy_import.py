@@ -18,7 +18,7 @@ from peers.problems import Problem
 from peers.ways import Clock, Found, LateError, Run, Way
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.ways.all_ways import INTEGRATOR_TOLERANCES
 from vibroimpact.orchestrator.study.ways.trials import ROWS_A_PERIOD
@@ -61,7 +61,7 @@ def _run(
 
 def opened(version: str, kind: str, problem: Problem, setting: float, clock: Clock) -> Run:
     """Return what simulates a problem by one version and kind of its FMU."""
-    folder = str(unpack(fmu_path(FMU_NAMES[problem.scene.body.kind], version)).folder)
+    folder = str(unpack(fmu_path(problem.scene.body.FMU, version)).folder)
     if kind == "CoSimulation":
         options: dict[str, Any] = {
             "output_interval": problem.period / setting,

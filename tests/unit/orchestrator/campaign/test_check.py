@@ -14,9 +14,9 @@ import vibroimpact.orchestrator.scene.sweep as sweep
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.orchestrator.campaign import cost_of
 from vibroimpact.orchestrator.campaign.check import BYTES_BESIDE
+from vibroimpact.orchestrator.run.summary import effects, engine, in_one_line, laws
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import effects, engine, in_one_line, laws
 
 BODY = "[body]\nmass = 1.0\nstiffness = 1.0\n"
 RECORD = "[record]\nrecorded_time = 5.0\n"

@@ -291,7 +291,7 @@ def test_a_body_that_cannot_restore_its_state_is_refused(tmp_path: Path) -> None
 
 
 def test_a_scene_with_pairs_says_what_hits_what() -> None:
-    from vibroimpact.orchestrator.scene.summary import contacts
+    from vibroimpact.orchestrator.run.summary import contacts
 
     scene: Scene = parse_scene(SCENE, "pairs.toml")
     assert contacts(scene) == {

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
 
 OSCILLATOR = "[body]\nmass = 1.0\nstiffness = 1.0\n"
 CHAIN = '[body]\nkind = "chain"\nmasses = [1.0, 1.0]\nstiffnesses = 1.0\n'

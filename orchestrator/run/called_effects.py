@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 from vibroimpact.fmus.shipped import package_folder
 from vibroimpact.orchestrator.importer.specification import ComponentSpec
+from vibroimpact.orchestrator.run.time_series import follow_energies
 from vibroimpact.orchestrator.scene.component_numbers import component_variable
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION
 from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
-from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 
 STRUCTURES = ("Chain", "Beam")
 """Bodies that follow their energies only where these are asked for."""

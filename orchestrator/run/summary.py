@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from vibroimpact.orchestrator.importer.specification import PairSpec, StopContactSpec
-from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
-from vibroimpact.orchestrator.scene.called_effects import called_by_components, called_by_numbers
+from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers
+from vibroimpact.orchestrator.run.limits import goes_by_lanes
+from vibroimpact.orchestrator.run.time_series import follow_energies
 from vibroimpact.orchestrator.scene.keys import MODES
-from vibroimpact.orchestrator.scene.lanes import goes_by_lanes
+from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
-from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
-from vibroimpact.orchestrator.scene.sampled_names import follow_energies
+from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION
 from vibroimpact.orchestrator.scene.scene import Scene
 
 EFFECTS_OF_THE_SHORT_FORM = (
@@ -43,21 +43,18 @@ def engine(scene: Scene, execution: str = "auto") -> str:
 
 def _body(scene: Scene) -> str:
     body = scene.body
-    if isinstance(body, OscillatorBody):
-        if all(isinstance(stop, RestitutionStop) for stop in scene.stops):
-            return "Oscillator, one mass, closed form between impacts"
-        return "Oscillator, one mass, as a structure because a stop yields"
-    kind, one, parts = (
-        ("Chain", "mass", "masses") if isinstance(body, ChainBody) else ("Beam", "mode", "modes")
-    )
+    if not body.IS_STRUCTURE:
+        yields = any(not LAWS[stop.law].is_rigid for stop in scene.stops)
+        how = "as a structure because a stop yields" if yields else "closed form between impacts"
+        return f"{body.FMU}, one mass, {how}"
     swept = [axis.values for axis in scene.sweep if axis.key == MODES]
     modes = f"{min(swept[0]):g} to {max(swept[0]):g}" if swept else ""
-    if isinstance(body, ChainBody):
-        used = modes or body.modes
-        reduced = f" by {used} mode{'' if used == 1 else 's'}" if used and used != body.size else ""
-        return f"{kind}, a structure of {body.size} {one if body.size == 1 else parts}{reduced}"
-    count = modes or str(body.size)
-    return f"{kind}, a structure of {count} {one if count == '1' else parts}"
+    if body.KEEPS_MODES:
+        count = modes or str(body.size)
+        return f"{body.FMU}, a structure of {count} {'mode' if count == '1' else 'modes'}"
+    used = modes or ("auto" if body.finds_modes else body.kept_modes)
+    reduced = f" by {used} mode{'' if used == 1 else 's'}" if used != body.size else ""
+    return f"{body.FMU}, a structure of {body.size} {'mass' if body.size == 1 else 'masses'}{reduced}"
 
 
 def laws(scene: Scene) -> dict[str, str]:
@@ -92,8 +89,8 @@ def effects(scene: Scene) -> dict[str, bool]:
             "watched events": bool(scene.events),
         }
         return {name: name in called for name in EFFECTS_OF_THE_SHORT_FORM} | found | common
-    called = called_by_numbers(scene)
-    followed = not isinstance(scene.body, OscillatorBody)
+    called, series = called_by_numbers(scene), scene.record.time_series
+    followed = scene.body.IS_STRUCTURE and series is not None
     return {
         "forcing": scene.forcing is not None,
         "recorded drive": scene.replay is not None and scene.replay.drive is not None,

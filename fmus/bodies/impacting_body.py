@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +12,10 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.core.orbits import OrbitBody
 
 Floats = NDArray[np.float64]
+Integers = Mapping[str, int]
+Numbers = Mapping[str, float]
+DIRECTIONS = {1: 1.0, 2: -1.0}
+"""Direction of a stop by the number of its side in FMUs: 1 is above, 2 below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,3 +105,12 @@ class ImpactingBody:
             abs(each.position) + float(np.abs(each.shape * steady).sum()) for each in self.contacts
         ]
         return max(of_contacts)
+
+
+def contacts_of(shapes: Iterable[Floats], numbers: Numbers, integers: Integers) -> tuple[Contact, ...]:
+    """Return the contacts of mass-normalised shapes by the parameters of a body's FMU."""
+    found = []
+    for k, shape in enumerate(shapes, start=1):
+        position, restitution = (numbers[f"contact[{k}].{name}"] for name in ("position", "restitution"))
+        found.append(Contact(shape, DIRECTIONS[integers[f"contact[{k}].side"]], position, restitution))
+    return tuple(found)

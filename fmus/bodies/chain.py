@@ -1,0 +1,87 @@
+"""Masses in a row at the points of a sweep: equations.md 5."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibroimpact.fmus.bodies.body_points import row_of
+from vibroimpact.fmus.bodies.impacting_body import Floats, Numbers
+from vibroimpact.fmus.bodies.structure import Structure, StructurePoints
+from vibroimpact.fmus.core.modes import ChainModes, chain_modes
+
+
+class ChainPoints(StructurePoints):
+    """Chains: mass-normalised modes; a state is that of the masses."""
+
+    START = ""
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Modes, elements of a state, amplitudes of the forcing: see `StructurePoints`."""
+        masses = self.integers["masses"]
+        return self.integers["modes"] or masses, masses, masses
+
+    def structure_of(self, numbers: Numbers) -> Structure | None:
+        """Return the modes of one point: see `StructurePoints`."""
+        kept, masses, _ = self.sizes
+        modes = self._modes(numbers)
+        if not modes.is_classical or not modes.frequencies[0] > 0.0:
+            return None
+        shapes = modes.shapes[:, :kept]
+        return Structure(
+            modes.frequencies[:kept],
+            modes.damping_ratios[:kept],
+            1.0,
+            shapes.T,
+            np.zeros(kept),
+            shapes[self.integers["observed_mass"] - 1],
+            shapes[self._hit].reshape(-1, kept),
+            shapes,
+            shapes.T * row_of(numbers, "mass", masses),
+        )
+
+    def _modes(self, numbers: Numbers) -> ChainModes:
+        masses = self.integers["masses"]
+        return chain_modes(
+            row_of(numbers, "mass", masses),
+            np.append(row_of(numbers, "stiffness", masses), numbers["far_stiffness"]),
+            np.append(row_of(numbers, "damping", masses), numbers["far_damping"]),
+        )
+
+    def normalised(self, displacements: Floats) -> Floats:
+        """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
+        numbers, (kept, masses, _) = self.floats, self.sizes
+        shapes = self._modes(numbers).shapes[:, :kept]
+        return np.asarray((displacements * row_of(numbers, "mass", masses)) @ shapes)
+
+    @property
+    def _hit(self) -> list[int]:
+        """The mass, from 0, of each contact."""
+        return [self.integers[f"contact[{k}].mass_number"] - 1 for k in range(1, self.stops + 1)]
+
+    def _masses(self) -> Floats:
+        return row_of(self.floats, "mass", self.integers["masses"])
+
+    def contact_shapes(self) -> Floats:
+        """Return 1 for the mass of each contact, shape (contact, mass)."""
+        return np.eye(self.integers["masses"])[self._hit]
+
+    def contact_mobilities(self, shapes: Floats) -> Floats:
+        """Return the shapes over the masses, shape (contact, mass)."""
+        return shapes / self._masses()
+
+    def contact_masses(self) -> Floats:
+        """Return the mass of each contact, kg."""
+        return self._masses()[self._hit]
+
+    def variables_at_contacts(self, what: str) -> tuple[str, ...]:
+        """Return the variables of the mass of each contact."""
+        return tuple(f"{what}[{hit + 1}]" for hit in self._hit)
+
+    @property
+    def flaw(self) -> str:
+        """Whether its damping couples the modes, or nothing ties it to the ground."""
+        modes = self._modes(self.floats)
+        if not modes.is_classical:
+            return "coupled"
+        return "" if modes.frequencies[0] > 0.0 else "loose"

@@ -1,0 +1,152 @@
+"""Bodies of several modes at the points of a sweep: each kind of structure among them is found once."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.bodies.body_points import BodyPoints, ModalPoints, row_of, rows_of, weighted
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, Numbers, contacts_of
+from vibroimpact.fmus.errors import VibroimpactError
+
+OF_THE_RUN = ("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_")
+"""Beginnings of the names of parameters that change no mode."""
+OF_A_STOP = (".position", ".restitution", ".yield_velocity")
+"""Ends of the names of parameters that change no mode."""
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """The modes of a chain or a beam.
+
+    Attributes
+    ----------
+    frequencies, damping_ratios : ndarray, shape (mode,)
+        rad/s, 1.
+    mass : float
+        The modal mass, kg; 1 of a chain.
+    load : ndarray, shape (mode, amplitude)
+        Force on each mode over its mass, for 1 of each amplitude of the forcing.
+    held : ndarray, shape (mode,)
+        Likewise for a constant force of 1 N.
+    observed : ndarray, shape (mode,)
+        Shape at the point that is recorded.
+    contacts : ndarray, shape (contact, mode)
+        At each stop.
+    to_state, from_state : ndarray, shape (element, mode) and (mode, element)
+        From modes to the displacements that are the body's state, and back.
+    """
+
+    frequencies: Floats
+    damping_ratios: Floats
+    mass: float
+    load: Floats
+    held: Floats
+    observed: Floats
+    contacts: Floats
+    to_state: Floats
+    from_state: Floats
+
+
+class StructurePoints(BodyPoints):
+    """Structures: a subclass says how the parameters of one point become modes."""
+
+    START: str
+    """Beginning of the names of start values: those of masses or of modes."""
+
+    @abstractmethod
+    def structure_of(self, numbers: Numbers) -> Structure | None:
+        """Return the modes of one point; None where damping couples them, or it is not tied to the ground."""
+
+    @property
+    @abstractmethod
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of the modes, of the elements of a state, and of the amplitudes of the forcing."""
+
+    @cached_property
+    def _kinds(self) -> tuple[tuple[Structure, ...], NDArray[np.int64]]:
+        """The different structures of the points, and which of them each point has, shape (point,)."""
+        names = [n for n in self.floats if not n.startswith(OF_THE_RUN) and not n.endswith(OF_A_STOP)]
+        kinds, which = _different(np.stack([self.floats[name] for name in names]))
+        return tuple(
+            self._structure_or_none(dict(zip(names, one.tolist(), strict=True))) for one in kinds.T
+        ), which
+
+    def _structure_or_none(self, numbers: Numbers) -> Structure:
+        """Return the modes of one point; all NaN where there are none."""
+        try:
+            with np.errstate(all="ignore"):
+                found = self.structure_of(numbers)
+        except (VibroimpactError, ArithmeticError, ValueError):
+            return self._no_structure()  # its body says what is wrong
+        return self._no_structure() if found is None else found
+
+    def _no_structure(self) -> Structure:
+        modes, elements, loads = self.sizes
+        row, square = np.full(modes, np.nan), np.full((modes, elements), np.nan)
+        contacts = np.full((self.stops, modes), np.nan)
+        return Structure(row, row, 1.0, np.full((modes, loads), np.nan), row, row, contacts, square.T, square)
+
+    def in_state_coordinates(self) -> ModalPoints:
+        """Return the points as modes, in the coordinates of their states: see `BodyPoints`."""
+        columns, (structures, which) = self.floats, self._kinds
+
+        def each(*values: Floats) -> Floats:
+            """Of the structures, shape (..., mode): of the points, shape (..., mode, point)."""
+            return np.stack(values, axis=-1)[..., which]
+
+        _, elements, loads = self.sizes
+        none = np.zeros(len(which))
+        start = [
+            rows_of(columns, f"{self.START}{name}_start", elements) for name in ("displacement", "velocity")
+        ]
+        load = each(*(structure.load.T for structure in structures))
+        back = each(*(structure.from_state.T for structure in structures))
+        contacts = each(*(structure.contacts for structure in structures))
+        mass = np.array([structure.mass for structure in structures])[which]
+        with np.errstate(all="ignore"):
+            return ModalPoints(
+                stiffness=each(*(structure.frequencies**2 for structure in structures)),
+                decay=each(*(structure.frequencies * structure.damping_ratios for structure in structures)),
+                force=weighted(load, rows_of(columns, "forcing.amplitude", loads)),
+                held=each(*(structure.held for structure in structures)) * columns.get("force", none),
+                shape=contacts,
+                impulse=contacts / mass,
+                observed=each(*(structure.observed for structure in structures)),
+                start_q=weighted(back, start[0]),
+                start_p=weighted(back, start[1]),
+                to_state=tuple(structure.to_state for structure in structures),
+                kind=which,
+            )
+
+    def mass_normalised(self) -> ImpactingBody:
+        """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
+        numbers = self.floats
+        found = self.structure_of(numbers)
+        assert found is not None, "a body without a flaw"
+        root = np.sqrt(found.mass)
+        amplitudes = row_of(numbers, "forcing.amplitude", found.load.shape[1])
+        if "forcing.amplitude" in numbers:
+            amplitudes = np.array([numbers["forcing.amplitude"]])
+        return ImpactingBody(
+            found.frequencies,
+            found.damping_ratios,
+            found.load @ amplitudes * root,
+            numbers.get("force", 0.0) * found.held * root,
+            numbers["forcing.angular_frequency"],
+            numbers.get("forcing.phase", 0.0),
+            contacts_of(found.contacts / root, numbers, self.integers),
+            found.observed / root,
+        )
+
+
+def _different(numbers: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Return the different columns of a table, and which of them each column is."""
+    if (numbers == numbers[:, :1]).all():
+        return numbers[:, :1], np.zeros(numbers.shape[1], dtype=np.int64)
+    kinds, which = np.unique(numbers, axis=1, return_inverse=True)
+    return kinds, which.reshape(-1)

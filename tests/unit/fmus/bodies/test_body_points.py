@@ -1,0 +1,97 @@
+"""Bodies by the parameters of their FMUs: both views are one body, at each point of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints
+
+STOP = {"contact[1].position": 0.3, "contact[1].restitution": 0.8}
+FORCE = {"forcing.angular_frequency": 2.0, "forcing.phase": 0.1}
+OSCILLATOR = {"mass": 2.0, "stiffness": 3.0, "damping": 0.1, "forcing.amplitude": 0.5}
+OSCILLATOR |= {"displacement_start": 0.1, "velocity_start": 0.2}
+CHAIN = {"mass[1]": 1.0, "mass[2]": 2.0, "stiffness[1]": 3.0, "stiffness[2]": 1.0, "far_stiffness": 0.5}
+CHAIN |= {"damping[1]": 0.06, "damping[2]": 0.02, "far_damping": 0.01, "forcing.amplitude[2]": 0.5}
+CHAIN |= {"displacement_start[1]": 0.1}
+BEAM = {"length": 0.4, "flexural_rigidity": 2.0, "mass_per_length": 0.3, "damping_ratio[1]": 0.01}
+BEAM |= {
+    "forcing_location": 1.0,
+    "sensor_location": 1.0,
+    "contact[1].location": 0.8,
+    "forcing.amplitude": 0.5,
+}
+BODIES: dict[str, tuple[dict[str, float], dict[str, int]]] = {
+    "Oscillator": (OSCILLATOR, {}),
+    "Chain": (CHAIN, {"masses": 2, "modes": 0, "observed_mass": 2, "contact[1].mass_number": 2}),
+    "Beam": (BEAM, {"modes": 3, "boundary": 1, "forcing.kind": 1}),
+}
+
+
+def body(fmu: str, **changes: float) -> BodyPoints:
+    floats, integers = BODIES[fmu]
+    numbers = floats | STOP | FORCE | changes
+    return POINTS_OF_FMU[fmu](numbers, integers | {"contact[1].law": 1, "contact[1].side": 1}, 1)
+
+
+def at_points(one: BodyPoints, columns: Mapping[str, np.ndarray]) -> BodyPoints:
+    count = len(next(iter(columns.values())))
+    floats = {name: np.full(count, value) for name, value in one.floats.items()} | columns
+    return type(one)(floats, one.integers, one.stops)
+
+
+@pytest.mark.parametrize("fmu", BODIES)
+def test_both_views_of_a_body_are_the_same_modes_under_the_same_force(fmu: str) -> None:
+    one = body(fmu)
+    orbit, lanes = (
+        one.mass_normalised(),
+        at_points(one, {"forcing.phase": np.zeros(3)}).in_state_coordinates(),
+    )
+    assert lanes.stiffness.shape == (len(orbit.frequencies), 3)
+    np.testing.assert_allclose(lanes.stiffness[:, 0], orbit.frequencies**2, rtol=1e-14)
+    np.testing.assert_allclose(lanes.decay[:, 1], orbit.damping_ratios * orbit.frequencies, rtol=1e-14)
+    # what is seen of a steady force does not depend on the coordinates
+    seen = (lanes.observed * lanes.force / lanes.stiffness)[:, 2].sum()
+    assert seen == pytest.approx((orbit.observed * orbit.force / orbit.frequencies**2).sum(), rel=1e-13)
+    answer = (lanes.shape[0] * lanes.impulse[0])[:, 0].sum()
+    assert answer == pytest.approx(1.0 / orbit.contacts[0].mass, rel=1e-13)
+
+
+def test_a_stop_meets_the_mass_that_it_limits_and_on_a_beam_that_of_its_modes() -> None:
+    assert body("Oscillator").contact_masses() == [2.0]
+    with_all_modes = body("Chain")
+    assert with_all_modes.contact_masses() == [2.0]
+    assert with_all_modes.mass_normalised().contacts[0].mass == pytest.approx(2.0, rel=1e-13)
+    beam = body("Beam")
+    assert beam.contact_masses()[0] == pytest.approx(beam.mass_normalised().contacts[0].mass, rel=1e-13)
+
+
+@pytest.mark.parametrize("fmu", BODIES)
+def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> None:
+    key = {"Oscillator": "stiffness", "Chain": "stiffness[1]", "Beam": "length"}[fmu]
+    values = np.array([0.7, 0.9, 0.7])
+    together = at_points(body(fmu), {key: values}).in_state_coordinates()
+    for point, value in enumerate(values):
+        alone = at_points(body(fmu), {key: np.array([value])}).in_state_coordinates()
+        for name in ("stiffness", "decay", "force", "shape", "impulse", "observed", "start_q"):
+            assert getattr(together, name)[..., point].tobytes() == getattr(alone, name)[..., 0].tobytes()
+
+
+def test_a_chain_that_does_not_fly_in_modes_says_why_and_is_left_by_lanes() -> None:
+    tied = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
+    assert body("Chain").flaw == "", "its dampings are in proportion to its stiffnesses"
+    assert body("Chain", far_damping=0.5).flaw == "coupled"
+    loose = body("Chain", **tied)
+    assert loose.flaw == "loose"
+    assert np.isnan(at_points(loose, {"forcing.phase": np.zeros(2)}).in_state_coordinates().stiffness).all()
+    assert body("Oscillator", stiffness=0.0).flaw == "loose"
+    assert body("Beam").flaw == ""
+
+
+def test_a_state_is_told_in_mass_normalised_modes_with_its_kinetic_energy() -> None:
+    velocities = np.array([[0.3, -0.2]])
+    modal = body("Chain").normalised(velocities)
+    assert (modal**2).sum() == pytest.approx(1.0 * 0.3**2 + 2.0 * 0.2**2, rel=1e-13)
+    assert body("Oscillator").normalised(np.array([[0.3]]))[0, 0] ** 2 == pytest.approx(2.0 * 0.3**2)
