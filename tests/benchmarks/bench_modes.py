@@ -93,7 +93,7 @@ def main() -> None:
                     scene = scene_of(name, place, stiffness, impacts)
                     for tolerance in TOLERANCES:
                         both = [found(scene, tolerance, residual) for residual in (False, True)]
-                        counts = ["> 32" if one is None else f"{one.body.size}" for one in both]  # type: ignore[union-attr]
+                        counts = ["> 32" if one is None else f"{one.body.size}" for one in both]
                         ratio = ""
                         if None not in both:
                             natural, residual = seconds([one for one in both if one], repetitions)
