@@ -183,7 +183,9 @@ def _leave_out_alternatives(document: dict[str, Any], changes: Sequence[Change])
         table, name = change.path[:-1], change.path[-1]
         other = ALTERNATIVES.get(name) if isinstance(name, str) else None
         if table in (("body",), ("forcing",)) and other is not None and (*table, other) not in keys:
-            document[str(table[0])].pop(other, None)
+            owner = document[str(table[0])]
+            if isinstance(owner, dict):  # a later change may have put something else in its place
+                owner.pop(other, None)
 
 
 def _without_effect(document: Mapping[str, Any], change: Change) -> list[Problem]:

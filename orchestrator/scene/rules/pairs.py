@@ -211,12 +211,12 @@ def _free_port(draft: GeneralDraft, component: DraftComponent, rest: str, plan: 
         wanted = _start_values(component.facts, port, rest)
         if all(parameters.get(name) == value for name, value in wanted.items()):
             return port
-    swept = draft.document.get("sweep")
+    swept = draft.written("sweep")
     named = [point for table in draft.contacts if isinstance(table, PairTable) for point in table.between]
     used = {
         *parameters,
         *plan.parameters.get(component.name, {}),
-        *(component_variable(key)[1] for key in swept or () if component_variable(key)[0] == component.name),
+        *(component_variable(key)[1] for key in swept if component_variable(key)[0] == component.name),
         *(f"{component_variable(p)[1]}.law" for p in named if component_variable(p)[0] == component.name),
         *(
             component_variable(c.target)[1]

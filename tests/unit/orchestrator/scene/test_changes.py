@@ -107,6 +107,11 @@ def test_the_later_of_two_changes_of_a_key_counts() -> None:
     assert changed(*[f"body.mass={number}" for number in range(1, 1001)]).value("body.mass") == 1000.0
 
 
+def test_a_table_may_be_changed_after_a_key_of_it() -> None:
+    with pytest.raises(SceneError, match="body: expected a table, got nan"):
+        parse_scene(ONE_STOP, "s.toml", ["body.damping_ratio=0.1", "body=nan"])
+
+
 def test_a_number_that_the_sweep_replaces_is_not_changed_in_vain() -> None:
     said = refused("stop[1].restitution=0.9", text=ONE_STOP + SWEEP)
     assert said.startswith("--set: stop[1].restitution: expected a key that the scene does not sweep")

@@ -83,6 +83,10 @@ def test_the_numbers_of_a_pair_are_swept_and_have_units() -> None:
         scene.value("contact[1].stiffness")
 
 
+def test_a_sweep_that_is_no_table_leaves_the_ports_to_the_pairs() -> None:
+    assert problem_of(f"sweep = 1.0\n{SCENE}").startswith("pairs.toml: sweep: expected a table, got 1.0.")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
