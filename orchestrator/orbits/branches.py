@@ -26,7 +26,7 @@ from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import Argument, Either, Message, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.find import orbit_of_run
+from vibroimpact.orchestrator.orbits.find import long_runs, orbit_of_impacts
 from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
@@ -291,10 +291,15 @@ def _ends_of_runs(
     scene: Scene, parameter: str, settings: FollowSettings
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Yield the orbits that runs end on, with their values of the parameter."""
-    for value in seed_values(settings):
-        orbit = _orbit_of_run_at(scene, parameter, value)
-        if orbit is not None:
-            yield value, orbit
+    with long_runs(scene) as impacts_at:
+        for value in seed_values(settings):
+            try:
+                body = impacting_body(scene.with_values({parameter: value}))
+            except SceneError:
+                continue  # the scene has no run there
+            orbit = orbit_of_impacts(body, impacts_at({parameter: value}))
+            if orbit is not None:
+                yield value, orbit
 
 
 def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
@@ -305,14 +310,6 @@ def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
 def _asking(impacts: int, periods: int) -> Message:
     """Return what asks for orbits of some impacts and periods."""
     return message(Argument("impacts", impacts), Either(", ", " "), Argument("periods", periods))
-
-
-def _orbit_of_run_at(scene: Scene, parameter: str, value: float) -> PeriodicOrbit | None:
-    """Return the orbit that a run ends on at a value of the parameter; None where the scene has no run there."""
-    try:
-        return orbit_of_run(scene.with_values({parameter: value}))
-    except SceneError:
-        return None
 
 
 def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed) -> Followings:

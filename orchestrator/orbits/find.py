@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -17,6 +17,7 @@ from vibroimpact.analysis.orbits.branches import multiplier_text
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
 from vibroimpact.analysis.study import Study, whole
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.printing import table
@@ -25,8 +26,8 @@ from vibroimpact.orchestrator.operations.orbit import FindOrbits
 from vibroimpact.orchestrator.orbits.beginning import begun, files_of, refuse_contradictions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.seeds import Seed
-from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.provenance import scene_attributes
+from vibroimpact.orchestrator.running.kept import opened_scene as kept_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
 
@@ -171,8 +172,9 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
     return orbit.once
 
 
-def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
-    """Return the orbit that a long run of a scene ends on; None where it ends on none of few periods."""
+@contextmanager
+def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float]], Floats | None]]:
+    """Yield what runs a scene long at some values of its keys, and returns its last impacts as `RunRecord` has them."""
     long = scene.with_values(
         {
             "record.transient_periods": TRANSIENT,
@@ -180,12 +182,18 @@ def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
             "record.impacts": True,
         }
     )
-    runner = PointRunner(long)
-    try:
-        rows = runner.run({}).impacts
-    finally:
-        runner.close()
-    body = impacting_body(scene)
+    with kept_scene(long) as opened:
+        yield lambda values: opened.runner.run(values).impacts
+
+
+def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
+    """Return the orbit that a long run of a scene ends on; None where it ends on none of few periods."""
+    with long_runs(scene) as impacts_at:
+        return orbit_of_impacts(impacting_body(scene), impacts_at({}))
+
+
+def orbit_of_impacts(body: ImpactingBody, rows: Floats | None) -> PeriodicOrbit | None:
+    """Return the orbit that the last impacts of a run are on; None where they are on none of few periods."""
     if rows is None or not len(rows):
         return None
     turns = np.floor(
