@@ -89,8 +89,7 @@ def effects(scene: Scene) -> dict[str, bool]:
             "watched events": bool(scene.events),
         }
         return {name: name in called for name in EFFECTS_OF_THE_SHORT_FORM} | found | common
-    called, series = called_by_numbers(scene), scene.record.time_series
-    followed = scene.body.IS_STRUCTURE and series is not None
+    called, followed = called_by_numbers(scene), scene.body.IS_STRUCTURE
     return {
         "forcing": scene.forcing is not None,
         "recorded drive": scene.replay is not None and scene.replay.drive is not None,
