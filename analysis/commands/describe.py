@@ -33,13 +33,7 @@ _NOTES = ("title", "history", "engine", "channel", "verdict")
 
 
 def describe_file(options: Describe) -> None:
-    """Print what a file of this package holds.
-
-    Raises
-    ------
-    DatasetError
-        The file is missing, damaged or foreign.
-    """
+    """Print what a file of this package holds; one that is missing, damaged or foreign raises DatasetError."""
     file = dataset_file(options.file)
     console = wide_terminal()
     with opened_file(file) as data:

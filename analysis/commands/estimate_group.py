@@ -20,13 +20,7 @@ class EstimateGroup(TyperGroup):
     """The command `estimate`, which says what its form of version 0.1, `estimate FILE --kind KIND`, is now."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse what follows `estimate`.
-
-        Raises
-        ------
-        UsageError
-            It has the old form; with the command to write.
-        """
+        """Parse what follows `estimate`; its old form raises UsageError, with the command to write."""
         if args and args[0] not in (*self.commands, "--help") and _has_old_form(args[0]):
             kind, words = _without_kind(args)
             names = [kind] if kind in self.commands else self._kinds(words)

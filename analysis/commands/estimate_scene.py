@@ -32,12 +32,7 @@ _RULES = {
 
 
 def refuse_numbers(options: EstimateImpacts) -> None:
-    """Refuse numbers that break their rules.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Raise UsageError if numbers break their rules."""
     for name, rule in _RULES.items():
         value = getattr(options, name)
         if value is None:
@@ -50,10 +45,7 @@ def refuse_numbers(options: EstimateImpacts) -> None:
 def kind_of(data: Path, *, one_run: bool) -> str:
     """Return what `vibroimpact estimate` finds in data: decay, impacts or response; of one run never a response.
 
-    Raises
-    ------
-    DatasetError
-        The file is missing, damaged or foreign.
+    A file that is missing, damaged or foreign raises DatasetError.
     """
     if is_recording(data):
         return "decay"
@@ -144,12 +136,7 @@ def forcing_and_known(
 
     No force where its frequency or amplitude is 0: a body that bounces under its weight. Of the scene only forcing and
     stop are taken: what an experiment would know too. Stiffness and damping are left to be estimated, unless options
-    say them.
-
-    Raises
-    ------
-    UsageError
-        The forcing frequency is not known, or options contradict each other.
+    say them. UsageError: the forcing frequency is not known, or options contradict each other.
     """
     scene = run_scene(options.data, options.run, recording)
     reading = _reading_of(channel, scene)
@@ -249,10 +236,7 @@ def _static_deflection(
 def cut(channel: Channel, start: float | None, stop: float | None) -> Channel:
     """Return the part of a channel from start to stop (s); clocks stay as they are.
 
-    Raises
-    ------
-    UsageError
-        Nothing is left.
+    UsageError: nothing is left.
     """
     if start is None and stop is None:
         return channel

@@ -81,13 +81,7 @@ def _mechanics(options: Spikes) -> Mechanics:
 
 
 def number(text: str, option: str) -> float:
-    """Return the number that an option was given as text.
-
-    Raises
-    ------
-    UsageError
-        It is none.
-    """
+    """Return the number that an option was given as text; another text raises UsageError."""
     try:
         return float(text)
     except ValueError as problem:

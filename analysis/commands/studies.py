@@ -36,12 +36,8 @@ class Studied(Places, Protocol):
 def conduct(options: Studied) -> None:
     """Carry out a study; what was found is printed, written and drawn, also when it ends half way.
 
-    Raises
-    ------
-    VibroimpactError
-        The study cannot be made, or it failed on the way; then what was found before is out.
-    typer.Exit
-        Ctrl-C came; likewise.
+    VibroimpactError: the study cannot be made, or it failed on the way; typer.Exit: Ctrl-C came. What was found before
+    is out then.
     """
     kind: type[Study[Any]] = pkgutil.resolve_name(f"{ROOT}.{options.study}")
     read = kind.reads(options)
@@ -89,10 +85,7 @@ def _nothing(kind: type[Study[Any]]) -> Interrupted:
 def _followed(study: Study[Any]) -> Exception | None:
     """Find the rows; return the failure that came on the way.
 
-    Raises
-    ------
-    VibroimpactError
-        Nothing was found before an interrupt or a failure.
+    VibroimpactError: nothing was found before an interrupt or a failure.
     """
     try:
         with study.shown() as status, closing(study.rows()) as rows:

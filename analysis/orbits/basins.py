@@ -66,14 +66,9 @@ class Flow(Protocol):
     """What follows many starts at once."""
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
-        """Return where states are after some forcing periods.
+        """Return where states, shape (start, variable), are after some forcing periods.
 
-        Parameters
-        ----------
-        states : array, shape (start, variable)
-        periods : int
-        first : bool
-            They are at time 0, not at forcing phase 0; the periods count from the next phase 0.
+        With `first` they are at time 0, not at forcing phase 0; the periods count from the next phase 0.
         """
 
     def classes(
@@ -87,27 +82,17 @@ class Flow(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """What starts end on.
-
-    Attributes
-    ----------
-    kind : RunClass
-    states : array, shape (period, variable)
-        At forcing phase 0; none of chaos.
-    radius : float
-        Distance, over the size of the motion, from which starts were seen to come back.
-    impacts : array, shape (stop,)
-        Mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter; NaN where they are
-        without number.
-    is_one : bool
-        False of chaotic motion that may lie on several attractors, which were not told apart.
-    """
+    """What starts end on."""
 
     kind: RunClass
     states: Floats
+    """At forcing phase 0, shape (period, variable); none of chaos."""
     radius: float
+    """Distance, over the size of the motion, from which starts were seen to come back."""
     impacts: Floats
+    """Mean number a forcing period, shape (stop,), but for slow ones of a chatter; NaN if they are without number."""
     is_one: bool = True
+    """False of chaotic motion that may lie on several attractors, which were not told apart."""
 
     @property
     def is_chaotic(self) -> bool:

@@ -60,15 +60,9 @@ def dataset_of_branches(
 def dataset_of_orbits(
     orbits: Sequence[PeriodicOrbit], *, units: UnitSystem = "SI", attrs: Mapping[str, Any] | None = None
 ) -> xr.Dataset:
-    """Return orbits of one body as the runs of a dataset, each a branch of its own, over their forcing frequency.
+    """Return orbits of one body, one at least, as the runs of a dataset over their forcing frequency.
 
-    Parameters
-    ----------
-    orbits : sequence of PeriodicOrbit
-        One at least.
-    units : {"SI", "nondimensional"}
-    attrs : mapping, optional
-        Attributes of the file.
+    Each is a branch of its own; `attrs` are attributes of the file.
     """
     return _dataset(
         orbits,

@@ -99,22 +99,15 @@ def block_features(
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """Runs of a sample by their attractor.
-
-    Attributes
-    ----------
-    labels : array of int, shape (run,)
-        Group of each run; the group of most runs is 0.
-    means, spreads : array, shape (group, feature)
-        Mean and standard deviation of a block.
-    is_sure : bool
-        False where the runs differ more than their blocks explain, but are not apart.
-    """
+    """Runs of a sample by their attractor."""
 
     labels: NDArray[np.int64]
+    """Group of each run, shape (run,); the group of most runs is 0."""
     means: Floats
     spreads: Floats
+    """`means` and `spreads`: mean and standard deviation of a block, shape (group, feature)."""
     is_sure: bool = True
+    """False where the runs differ more than their blocks explain, but are not apart."""
 
     def of(self, blocks: Floats) -> NDArray[np.int64]:
         """Return the group of single blocks, shape (start, feature); -1 where a block fits none."""
@@ -138,13 +131,8 @@ NO_GROUPS = Groups(np.empty(0, np.int64), np.empty((0, 0)), np.empty((0, 0)))
 def grouped(features: Floats) -> Groups:
     """Return the groups of runs that lie on different attractors.
 
-    Parameters
-    ----------
-    features : array, shape (run, block, stop, feature)
-        Of chaotic runs without their transients.
+    Features are those of chaotic runs without their transients, shape (run, block, stop, feature).
 
-    Examples
-    --------
     >>> noise = np.random.default_rng(1).normal(0.0, 0.1, (6, BLOCKS, 1, len(Feature)))
     >>> grouped(noise + np.array([0.0, 1, 0, 1, 1, 1])[:, None, None, None]).labels
     array([1, 0, 1, 0, 0, 0])

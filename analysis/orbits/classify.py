@@ -120,15 +120,7 @@ class ClassesOfRuns(list[RunClass]):
 
 @dataclass(eq=False)
 class ClassesOfDataset(Study[RunClass]):
-    """The classes of the runs of a dataset; a row is the class of a run.
-
-    Parameters
-    ----------
-    runs : xarray.Dataset
-        As `open_dataset` gives it.
-    file : path, optional
-        Its file.
-    """
+    """The classes of the runs of a dataset; a row is the class of a run."""
 
     name = "classify"
     nothing = "a class"
@@ -137,6 +129,7 @@ class ClassesOfDataset(Study[RunClass]):
     figure = "classes"
 
     runs: xr.Dataset
+    """As `open_dataset` gives it."""
     file: Path | None = None
 
     @classmethod
@@ -163,10 +156,7 @@ class ClassesOfDataset(Study[RunClass]):
     def rows(self) -> Generator[RunClass, None, None]:
         """Classify run after run.
 
-        Raises
-        ------
-        DatasetError
-            The dataset has one value for all periods, or neither strobe nor extrema.
+        A dataset of one value for all periods, or without strobe and extrema, raises DatasetError.
         """
         runs = self.runs.vibroimpact.runs
         columns = [name for name in _STATES if name in runs.variables]
@@ -262,13 +252,7 @@ def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
     """Return a one-dimensional dataset with the classes of its runs, as it is written to a file.
 
-    Parameters
-    ----------
-    flat : xarray.Dataset
-        As `read_flat` gives it.
-    classes : sequence of RunClass
-        In the order of its runs.
-    units : {"SI", "nondimensional"}
+    The dataset is as `read_flat` gives it, the classes are in the order of its runs.
     """
     columns = _columns(classes).items()
     return flat.assign({name: ("run", values, attributes_of(name, units)) for name, values in columns})

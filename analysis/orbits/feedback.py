@@ -17,18 +17,12 @@ LAWS: tuple[Law, ...] = ("ogy", "deadbeat", "newton")
 
 @dataclass(frozen=True, eq=False)
 class ImpactMap:
-    """The map of impacts, linear about an orbit P(1,q): (t, V) at an impact leads to (t, V) at the next.
-
-    Attributes
-    ----------
-    jacobian : array, shape (2, 2)
-        Over (t, V): s, m/s.
-    response : array, shape (2,)
-        Over the forcing amplitude: s/N, (m/s)/N.
-    """
+    """The map of impacts, linear about an orbit P(1,q): (t, V) at an impact leads to (t, V) at the next."""
 
     jacobian: Floats
+    """Over (t, V): s, m/s; shape (2, 2)."""
     response: Floats
+    """Over the forcing amplitude: s/N, (m/s)/N; shape (2,)."""
 
     @property
     def multipliers(self) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:

@@ -23,46 +23,25 @@ _SPEED, _COSINE = 1, 2
 
 
 class FlightWork(NamedTuple):
-    """What a mode goes through in a flight.
-
-    Attributes
-    ----------
-    end : array, shape (..., 2)
-        w q and q' at its end, m/s kg^(1/2).
-    forcing : array, shape (...)
-        Integral of f cos(phase) q', J.
-    squared : array, shape (...)
-        Integral of q'^2, J s: times 2 z w what damping takes.
-    """
+    """What a mode goes through in a flight."""
 
     end: Floats
+    """w q and q' at its end, m/s kg^(1/2), shape (..., 2)."""
     forcing: Floats
+    """Integral of f cos(phase) q', J, shape (...)."""
     squared: Floats
+    """Integral of q'^2, J s, shape (...): times 2 z w what damping takes."""
 
 
 def flight_work(
     natural: Floats, damping_ratio: Floats, angular_frequency: float, lengths: Floats, start: Floats
 ) -> FlightWork:
-    """Return the end of flights of modes, and the integrals over them.
+    """Return the end of flights of modes, and the integrals over them, of shape (flights, modes).
 
-    Parameters
-    ----------
-    natural, damping_ratio : array, shape (modes,)
-        Natural angular frequencies (rad/s), damping ratios.
-    angular_frequency : float
-        Of the force, rad/s.
-    lengths : array, shape (flights,)
-        s.
-    start : array, shape (flights, modes, 4)
-        w q, q', f cos(phase), f sin(phase) at the start; f: modal amplitude of the force.
+    Natural angular frequencies (rad/s) and damping ratios have shape (modes,), lengths (s) shape (flights,). The
+    angular frequency, rad/s, is that of the force. The start has w q, q', f cos(phase), f sin(phase) of each mode,
+    shape (flights, modes, 4); f is the modal amplitude of the force.
 
-    Returns
-    -------
-    FlightWork
-        Of shape (flights, modes).
-
-    Examples
-    --------
     A free undamped mode has the mean of q'^2 of a cosine, over whole periods:
 
     >>> start = np.array([[[1.0, 0.0, 0.0, 0.0]]])

@@ -21,23 +21,16 @@ JUMP = 0.5
 
 @dataclass(frozen=True, eq=False)
 class GrazingSets:
-    """Both sets, along the phase of the graze; NaN where there is no flight, and between two pieces of a curve.
-
-    Attributes
-    ----------
-    grazes : array
-        Phases at which an impact without speed is one: the body leaves the stop after it, rad.
-    before_phase, before_velocity : array
-        S: impacts whose next one is the graze, rad and m/s.
-    after_phase, after_velocity : array
-        W: the impacts after the graze.
-    """
+    """Both sets, along the phase of the graze; NaN where there is no flight, and between two pieces of a curve."""
 
     grazes: Floats
+    """Phases at which an impact without speed is one: the body leaves the stop after it, rad."""
     before_phase: Floats
     before_velocity: Floats
+    """`before_phase` and `before_velocity`: S, impacts whose next one is the graze, rad and m/s."""
     after_phase: Floats
     after_velocity: Floats
+    """`after_phase` and `after_velocity`: W, the impacts after the graze."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,12 +41,8 @@ def impacts_of_runs(dataset: xr.Dataset) -> Iterator[tuple[xr.Dataset, float | N
 def states_of_periods(impacts: xr.Dataset, frequency: float) -> tuple[Floats, Floats]:
     """Return what whole forcing periods show, and how many impacts each has; they are cut where no impact is near.
 
-    Returns
-    -------
-    states : array, shape (period, 2)
-        Forcing periods from the cut to the strongest impact, and its speed, m/s; 0 without one.
-    counts : array, shape (period,)
-        Infinite where bodies come to rest on each other.
+    States, shape (period, 2), are the forcing periods from the cut to the strongest impact, and its speed, m/s; 0
+    without one. Counts, shape (period,), are infinite where bodies come to rest on each other.
     """
     turns = impacts["impact_time"].values * abs(frequency) / (2.0 * np.pi)
     if not turns.size:

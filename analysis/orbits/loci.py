@@ -40,19 +40,13 @@ BodyAt2 = Callable[[float, float], ImpactingBody]
 
 @dataclass(frozen=True, eq=False)
 class LocusPoint:
-    """An orbit at its bifurcation.
-
-    Attributes
-    ----------
-    values : tuple of float
-        Of both parameters.
-    orbit : PeriodicOrbit
-    tangent : array, shape (p + 2,)
-    """
+    """An orbit at its bifurcation."""
 
     values: tuple[float, float]
+    """Of both parameters."""
     orbit: PeriodicOrbit
     tangent: Floats
+    """Shape (p + 2,)."""
 
 
 @dataclass(slots=True)

@@ -174,13 +174,7 @@ class PeriodicOrbit:
 
 
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
-    """Return what belongs to phases of impacts.
-
-    Raises
-    ------
-    OrbitError
-        No motion belongs to them.
-    """
+    """Return what belongs to phases of impacts; OrbitError where no motion does."""
     found = body.kernel.evaluate(contacts, phases, periods)
     if found.end is OrbitEnd.resonant:
         raise OrbitError(

@@ -39,17 +39,11 @@ class Impacts(NamedTuple):
 
 
 class RecordedOrbit(NamedTuple):
-    """The orbit next to recorded impacts.
-
-    Attributes
-    ----------
-    orbit : PeriodicOrbit
-    distance : float
-        Largest difference of a velocity from that of the orbit, over the largest: what is left of a transient.
-    """
+    """The orbit next to recorded impacts."""
 
     orbit: PeriodicOrbit
     distance: float
+    """Largest difference of a velocity from that of the orbit, over the largest: what is left of a transient."""
 
 
 def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:

@@ -18,16 +18,10 @@ _ADVICE = 'Sweep two keys or more with a distribution and sample = { design = "s
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """A Saltelli design.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Coordinates of the keys that are drawn, in the order of the design.
-    blocks : int
-    """
+    """A Saltelli design."""
 
     names: tuple[str, ...]
+    """Coordinates of the keys that are drawn, in the order of the design."""
     blocks: int
 
     def parts(self, values: Floats) -> tuple[Floats, Floats, Floats]:
@@ -39,10 +33,7 @@ class Design:
 def design_of(dataset: xr.Dataset) -> Design:
     """Return the design of an opened dataset.
 
-    Raises
-    ------
-    DatasetError
-        Its points are drawn in another way or not at all, or blocks of the design are not whole.
+    DatasetError: its points are drawn in another way or not at all, or blocks of the design are not whole.
     """
     names = [name for name in swept_names(dataset) if dataset[name].attrs.get(SWEPT_ALONG) == DRAW]
     if len(names) < 2:

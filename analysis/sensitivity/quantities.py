@@ -18,18 +18,10 @@ _RAN = (Outcome.ok, Outcome.stuck)
 def quantities_of(dataset: xr.Dataset) -> xr.Dataset:
     """Return what can be looked at in an opened dataset, on the dimensions of its sweep.
 
-    A run that did not come to its end has none: NaN.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-
-    Returns
-    -------
-    xarray.Dataset
-        Of `displacement_range`; `impacts_per_period`, their mean; `impact_count` or `event_count`, where there are no
-        periods; `impact_velocity`, the largest, 0 where nothing was hit; `NAME_rms` of each sampled variable;
-        `variance_accounted_for` of each pair of signals of a replay, numbered; those that were recorded.
+    A run that did not come to its end has none: NaN. What was recorded counts: `displacement_range`;
+    `impacts_per_period`, their mean; `impact_count` or `event_count`, where there are no periods; `impact_velocity`,
+    the largest, 0 where nothing was hit. So do `NAME_rms` of each sampled variable, and `variance_accounted_for` of
+    each pair of signals of a replay, numbered.
     """
     ran = dataset["outcome"].isin(_RAN)
     found = {name: values.where(ran) for name, values in _recorded(dataset)}

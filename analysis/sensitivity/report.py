@@ -83,12 +83,8 @@ class SensitivityOfCampaign(Study[int]):
     def rows(self) -> Generator[int, None, None]:
         """Estimate the indices, then resample the blocks batch after batch.
 
-        Raises
-        ------
-        DatasetError
-            The dataset has no Saltelli design, or nothing that varies over it.
-        UsageError
-            There is no such quantity; or the level, the number of resamples or the seed makes no sense.
+        DatasetError: the dataset has no Saltelli design, or nothing that varies over it. UsageError: there is no such
+        quantity; or the level, the number of resamples or the seed makes no sense.
         """
         dataset, self._design = self.campaign, design_of(self.campaign)
         if taken := sorted({"quantity", "parameter", "bound"} & set(map(str, dataset["outcome"].dims))):
@@ -107,13 +103,7 @@ class SensitivityOfCampaign(Study[int]):
         yield from self._estimation.batches()
 
     def made(self) -> xr.Dataset:
-        """Return the indices with their intervals.
-
-        Raises
-        ------
-        DatasetError
-            Nothing varies.
-        """
+        """Return the indices with their intervals; DatasetError where nothing varies."""
         coordinates = {
             str(name): c.variable.copy(deep=False)
             for name, c in self.campaign.coords.items()

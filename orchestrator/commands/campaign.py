@@ -50,13 +50,7 @@ def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | No
 def computed(
     scene: Scene, folder: Path, *, workers: int | None = None, scheduler: str | None = None
 ) -> CampaignReport:
-    """Run a campaign.
-
-    Raises
-    ------
-    typer.Exit
-        It was interrupted; what to do about it is said.
-    """
+    """Run a campaign; an interrupted one raises typer.Exit, and what to do about it is said."""
     try:
         with shown_progress() as progress:
             return run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)

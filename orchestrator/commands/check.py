@@ -33,12 +33,7 @@ _WIDTH = 10
 def check_scene(options: Check) -> None:
     """Load a scene, compute one point of it, and print what would run and what it would cost.
 
-    Raises
-    ------
-    SceneError
-        The scene has problems.
-    typer.Exit
-        The point failed.
+    SceneError: the scene has problems. typer.Exit: the point failed.
     """
     scene = with_modes(opened_scene(options.scene, options.changes or (), strict=options.strict))
     say(f"{options.scene}: no problems")

@@ -26,12 +26,8 @@ STEPS_ALLOWED = 2.0
 def run_demo(options: Demo) -> None:
     """Run the packaged bifurcation scene into a folder, draw its figure there, and say what was done and read.
 
-    Raises
-    ------
-    CampaignError
-        When a reading is not within `STEPS_ALLOWED` of its exact value.
-    typer.Exit
-        The campaign was interrupted.
+    A reading that is not within `STEPS_ALLOWED` of its exact value raises CampaignError, an interrupted campaign
+    typer.Exit.
     """
     console, output = Terminal(soft_wrap=True), options.output
     began = time.perf_counter()

@@ -21,13 +21,7 @@ from vibroimpact.orchestrator.study.preparing import prepared
 
 
 def run_to_dataset(options: Run) -> None:
-    """Run a scene into a dataset and say what was run and what failed.
-
-    Raises
-    ------
-    typer.Exit
-        The only run failed.
-    """
+    """Run a scene into a dataset and say what was run and what failed; typer.Exit if the only run failed."""
     began = time.perf_counter()
     output = options.output
     loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)

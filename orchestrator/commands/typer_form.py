@@ -23,12 +23,8 @@ ORDER = [name for names in PANELS.values() for name in names]
 def add_commands(app: typer.Typer, words: Sequence[str] | None = None) -> None:
     """Add the commands of the package to an app.
 
-    Parameters
-    ----------
-    app : typer.Typer
-    words : sequence of str, optional
-        What was typed, options left out. The command that it names is added alone: typer builds one in 2 ms. Where it
-        names none, commands have their names and first lines alone. Without it all are added whole.
+    `words` are what was typed, options left out. The command that they name is added alone: typer builds one in 2 ms.
+    Where they name none, commands have their names and first lines alone. Without words all are added whole.
     """
     called = words[0] if words else ""
     for name in [called] if called in ORDER else ORDER:

@@ -17,19 +17,13 @@ NOTHING_LEFT = 1e-18
 
 @dataclass(frozen=True, slots=True)
 class Bounces:
-    """Impacts of a mass on its stop, and how they end.
-
-    Attributes
-    ----------
-    phases, speeds : list of float
-        Of the impacts: phase after the turn of the load, speed.
-    rest : float
-        Phase at which infinitely many bounces have come to rest; NaN: the mass leaves before.
-    """
+    """Impacts of a mass on its stop, and how they end."""
 
     phases: list[float]
+    """Of the impacts, after the turn of the load."""
     speeds: list[float]
     rest: float
+    """Phase at which infinitely many bounces have come to rest; NaN: the mass leaves before."""
 
 
 def gained(load: float, slope: float, angle: float) -> tuple[float, float]:

@@ -33,13 +33,7 @@ def recorded(**tables: Any) -> RunRecord:
 
 
 def run(**tables: Any) -> RunRecord:
-    """Run a nondimensional scene, fused, to its end.
-
-    Raises
-    ------
-    ComponentError
-        The run ended early.
-    """
+    """Run a nondimensional scene, fused, to its end; one that ends early raises ComponentError."""
     record = recorded(**tables)
     if record.outcome not in (Outcome.ok, Outcome.stuck):
         raise ComponentError(

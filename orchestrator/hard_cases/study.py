@@ -103,10 +103,7 @@ class MeasuredCases(Study[Measured]):
     def conclude(self, options: HardCases) -> None:
         """Say how many bounds were met.
 
-        Raises
-        ------
-        typer.Exit
-            A figure is wrong, and no case was left out.
+        A wrong figure, where no case was left out, raises typer.Exit.
         """
         missed: Mapping[str, list[str]] = {word: self._of(word) for word in VERDICTS}
         met = sum(one.is_met for one in self.found)

@@ -92,12 +92,7 @@ class Plane:
     number: int | None = None
 
     def refuse(self) -> None:
-        """Refuse a plane that is none.
-
-        Raises
-        ------
-        UsageError
-        """
+        """Raise UsageError if the plane is none."""
         for name, span in (("x", self.x), ("y", self.y)):
             if span is not None and not (
                 math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]
@@ -222,14 +217,8 @@ def _element(scene: Scene, number: int | None) -> str:
 
 
 def span_of(text: str | None, name: str) -> Span | None:
-    """Return `LOW:HIGH` as two numbers.
+    """Return `LOW:HIGH` as two numbers; another text raises UsageError.
 
-    Raises
-    ------
-    UsageError
-
-    Examples
-    --------
     >>> span_of("-1:0.5", "x")
     (-1.0, 0.5)
     """
@@ -244,14 +233,8 @@ def span_of(text: str | None, name: str) -> Span | None:
 
 
 def points_of(text: str) -> tuple[int, int]:
-    """Return `N` or `NxM` as the starts along both axes.
+    """Return `N` or `NxM` as the starts along both axes; another text raises UsageError.
 
-    Raises
-    ------
-    UsageError
-
-    Examples
-    --------
     >>> points_of("200"), points_of("300x200")
     ((200, 200), (300, 200))
     """

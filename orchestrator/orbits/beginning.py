@@ -51,12 +51,7 @@ def files_of(options: Beginning) -> list[Path]:
 
 
 def refuse_contradictions(options: Beginning) -> None:
-    """Refuse options that say two things, or half of one.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Raise UsageError if options say two things, or half of one."""
     if options.from_dataset is None:
         if options.run is not None:
             raise UsageError("--run: expected --from-dataset as well, got --run alone.")
@@ -68,23 +63,11 @@ def refuse_contradictions(options: Beginning) -> None:
 
 
 def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()) -> Begun:
-    """Return the scene at the values of the run of the dataset, if there is one, and the seed.
+    """Return the scene, without its sweep, at the values of the run of the dataset, if there is one, and the seed.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its sweep is left out.
-    changes : sequence of str
-        Which it was given, each KEY=VALUE.
-    varied : sequence of str
-        Keys that the command varies: values that the scene leaves to its sweep are not needed.
-
-    Raises
-    ------
-    UsageError
-        The seed is none, or a change is another than the run has.
-    DatasetError
-        The run has no orbit.
+    The scene was given the changes, each KEY=VALUE. The command varies the keys in `varied`: values that the scene
+    leaves to its sweep are not needed. UsageError: the seed is none, or a change is another than the run has.
+    DatasetError: the run has no orbit.
     """
     if options.from_dataset is None:
         return Begun(scene.unswept(varied), options.impacts, options.periods, _impacts_of(options.seed))

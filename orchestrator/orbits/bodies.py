@@ -40,15 +40,7 @@ def impacting_body(scene: Scene) -> ImpactingBody:
 def modal_displacements(scene: Scene, displacements: Floats) -> Floats:
     """Return displacements of the masses of a chain, or of the modes of a beam, in mass-normalised modes.
 
-    Parameters
-    ----------
-    scene : Scene
-    displacements : array, shape (state, mass or mode)
-        m; of an oscillator that of its mass.
-
-    Returns
-    -------
-    array, shape (state, mode)
-        kg^(1/2) m.
+    Displacements have shape (state, mass or mode), m; of an oscillator that of its mass. Those returned have shape
+    (state, mode), kg^(1/2) m.
     """
     return body_points(scene).normalised(displacements)

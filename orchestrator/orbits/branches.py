@@ -44,20 +44,13 @@ Followings = Iterator[tuple[Branch, BranchOrbit]]
 
 @dataclass(slots=True)
 class Followed:
-    """What was followed.
-
-    Attributes
-    ----------
-    scene : Scene
-    parameter : str
-        Key of the scene.
-    branches : list of Branch
-        Grows while they are followed.
-    """
+    """What was followed."""
 
     scene: Scene
     parameter: str
+    """Key of the scene."""
     branches: list[Branch] = field(default_factory=list)
+    """Grows while they are followed."""
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -78,21 +71,14 @@ class Followed:
 
 @dataclass(slots=True)
 class FollowedLoci:
-    """Bifurcations that were followed over two parameters.
-
-    Attributes
-    ----------
-    followed : Followed
-        The branches on which they were found.
-    second : str
-        Key of the second parameter.
-    loci : list of Locus
-        Grows while they are followed.
-    """
+    """Bifurcations that were followed over two parameters."""
 
     followed: Followed
+    """The branches on which they were found."""
     second: str
+    """Key of the second parameter."""
     loci: list[Locus] = field(default_factory=list)
+    """Grows while they are followed."""
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -142,17 +128,8 @@ class FollowedLoci:
 def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSettings) -> Iterator[Locus]:
     """Follow folds, period doublings and grazes of the branches over a second parameter; yield a locus as it grows.
 
-    Parameters
-    ----------
-    result : FollowedLoci
-        With the branches; the loci are put there.
-    first, second : FollowSettings
-        Ranges of both parameters.
-
-    Raises
-    ------
-    UsageError
-        The second parameter is no number of the scene.
+    The settings have the ranges of both parameters. The loci are put into `result`. UsageError: the second parameter is
+    no number of the scene.
     """
     scene, keys = result.followed.scene, (result.followed.parameter, result.second)
     value = float(scene.value(result.second))
@@ -175,12 +152,7 @@ def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSetti
 
 
 def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:
-    """Refuse a second parameter over which nothing can be followed.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Raise UsageError if nothing can be followed over a second parameter."""
     if result.followed.parameter == result.second:
         raise UsageError(
             f"--second: expected another number of the scene than {result.second}, got the same."
@@ -224,12 +196,8 @@ def follow_branches(
     range of the parameter counted 1, a radian of all phases 1; for the others see `vibroimpact.follow`. `looking` hears
     of each value at which orbits of several impacts are looked for.
 
-    Raises
-    ------
-    UsageError
-        The scene has no such orbits, or the parameter is no number of it.
-    OrbitError
-        There is no orbit to begin with.
+    UsageError: the scene has no such orbits, or the parameter is no number of it. OrbitError: there is no orbit to
+    begin with.
     """
     scene, parameter = followed.scene, followed.parameter
     _refuse(start, stop, impacts, periods, doublings, longest)
@@ -265,12 +233,7 @@ def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought
 def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[str]:
     """Return a line for each kind of orbit that runs in a range end on and no branch holds, the commonest first.
 
-    Parameters
-    ----------
-    followed : Followed
-        Branches that begin at orbits of one impact.
-    start, stop : float
-        Range of the parameter.
+    The range is that of the parameter; the branches begin at orbits of one impact.
     """
     settings = FollowSettings(min(start, stop), max(start, stop))
     ends = _ends_of_runs(followed.scene, followed.parameter, settings)
@@ -394,12 +357,8 @@ def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settin
 def _off_path(apart: NDArray[np.float64], steps: NDArray[np.float64]) -> float:
     """Return how far something is off a path.
 
-    Parameters
-    ----------
-    apart : ndarray, shape (n, d)
-        What parts it from the points of the path.
-    steps : ndarray, shape (n - 1, d)
-        From each point to the next.
+    `apart`, shape (n, d), parts it from the points of the path; `steps`, shape (n - 1, d), lead from each point to the
+    next.
     """
     squares = np.maximum((steps**2).sum(axis=1), np.finfo(np.float64).tiny)
     shares = np.clip(-(apart[:-1] * steps).sum(axis=1) / squares, 0.0, 1.0)

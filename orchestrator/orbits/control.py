@@ -108,10 +108,7 @@ class Controlled(Study[int]):
     def rows(self) -> Generator[int, None, None]:
         """Couple body, stop and controller, and let them go through the plan.
 
-        Raises
-        ------
-        ComponentError
-            pythonfmu is not installed; or a component fails.
+        ComponentError: pythonfmu is not installed, or a component fails.
         """
         with tempfile.TemporaryDirectory() as folder:
             controller = self.plan.controller(Path(folder, "controller.fmu"))

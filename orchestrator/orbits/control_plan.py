@@ -58,12 +58,7 @@ class ControlSettings:
     stay: int = 1
 
     def refuse(self) -> None:
-        """Refuse numbers that no control has.
-
-        Raises
-        ------
-        UsageError
-        """
+        """Raise UsageError if no control has these numbers."""
         if self.law not in LAWS:
             raise UsageError(f"control: law: expected one of {', '.join(LAWS)}, got {self.law!r}.")
         for name in ("step", "tolerance"):
@@ -85,13 +80,7 @@ class ControlSettings:
 
 
 def settings_of(law: str = "ogy", **numbers: Any) -> ControlSettings:
-    """Return settings whose law comes from outside.
-
-    Raises
-    ------
-    UsageError
-        They are none that a control has.
-    """
+    """Return settings whose law comes from outside; those that no control has raise UsageError."""
     settings = ControlSettings(cast("Law", law), **numbers)
     settings.refuse()
     return settings
@@ -99,25 +88,16 @@ def settings_of(law: str = "ogy", **numbers: Any) -> ControlSettings:
 
 @dataclass(frozen=True, eq=False)
 class ControlPlan:
-    """The orbits that are kept, one after the other, and the gains about each.
-
-    Attributes
-    ----------
-    scene : Scene
-    settings : ControlSettings
-    amplitude : float
-        Forcing amplitude, N.
-    orbits : list of PeriodicOrbit
-        One at each angular frequency.
-    ends_at : float or None
-        Angular frequency at which the branch ends, rad/s; None where it goes on beyond the plan.
-    """
+    """The orbits that are kept, one after the other, and the gains about each."""
 
     scene: Scene
     settings: ControlSettings
     amplitude: float
+    """Forcing amplitude, N."""
     orbits: list[PeriodicOrbit]
+    """One at each angular frequency."""
     ends_at: float | None
+    """Angular frequency at which the branch ends, rad/s; None where it goes on beyond the plan."""
 
     @property
     def rows(self) -> list[dict[str, Any]]:
@@ -125,13 +105,7 @@ class ControlPlan:
         return [_row(orbit, self.amplitude, self.settings.law) for orbit in self.orbits]
 
     def controller(self, output: Path) -> Path:
-        """Write the controller's FMU.
-
-        Raises
-        ------
-        ComponentError
-            pythonfmu is not installed.
-        """
+        """Write the controller's FMU; without pythonfmu ComponentError is raised."""
         settings = self.settings
         largest = max(float(orbit.velocities[0]) for orbit in self.orbits)
         return build_orbit_controller(

@@ -145,10 +145,7 @@ class EnergiesOfRuns(RunsStudy[tuple[Found, float]]):
     def made(self) -> xr.Dataset:
         """Return the energies of one run, or those of all on the dimensions of the sweep.
 
-        Raises
-        ------
-        DatasetError
-            The only run has no orbit.
+        An only run without an orbit raises DatasetError.
         """
         attrs, units = runs_attributes(self.runs.attrs), units_of(self.runs)
         if self._many > 1:

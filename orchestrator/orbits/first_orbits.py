@@ -30,29 +30,12 @@ def first_orbits(
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Return values of the parameter and a physical orbit at each; several may lie on one branch.
 
-    Parameters
-    ----------
-    body_at : callable
-        Body for a value of the parameter.
-    scene : Scene
-        Whose own value of the parameter a seed belongs to.
-    parameter : str
-        Key of the scene.
-    settings : FollowSettings
-        Range of the parameter.
-    impacts, periods : int, optional
-        p and q; one impact, or as many as the seed has.
-    seed : sequence of (phase, stop), optional
-        Impacts near to those of the only orbit.
-    looking : callable
-        Hears of each value at which many starts are tried.
+    The parameter is a key of the scene, whose own value a seed belongs to; the settings have its range. p and q are
+    `impacts` and `periods`: one impact, or as many as the seed has. The impacts of a seed, each a phase and a stop, are
+    near to those of the only orbit. `looking` hears of each value at which many starts are tried.
 
-    Raises
-    ------
-    UsageError
-        There is no such seed in the scene or in the range.
-    OrbitError
-        There is no physical orbit near to the seed.
+    UsageError: there is no such seed in the scene or in the range. OrbitError: there is no physical orbit near to the
+    seed.
     """
     if seed is not None:
         yield _of_seed(scene, parameter, settings, seed, impacts, periods)

@@ -206,13 +206,7 @@ def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:
 
 
 def _second_range(options: Follow) -> tuple[float, float] | None:
-    """Return the range of the second number.
-
-    Raises
-    ------
-    UsageError
-        It is half given, or empty.
-    """
+    """Return the range of the second number; UsageError if it is half given, or empty."""
     low, high = options.second_start, options.second_stop
     given = (options.second is not None, low is not None, high is not None)
     if any(given) and not all(given):

@@ -65,13 +65,7 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
         return _on_sweep(self.runs, [*self.found, *[self.left_out] * many], 2 * self._bodies.most_modes)
 
     def print_results(self) -> None:
-        """Print the exponents of runs, and how many have none.
-
-        Raises
-        ------
-        DatasetError
-            No run has exponents.
-        """
+        """Print the exponents of runs, and how many have none; DatasetError where no run has exponents."""
         reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
         counts = _counted([text for text in reasons if text])
         if all(reasons):

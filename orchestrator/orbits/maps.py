@@ -120,12 +120,7 @@ class MapSettings:
     slope: float | None = None
 
     def refuse(self) -> None:
-        """Refuse what is no map.
-
-        Raises
-        ------
-        UsageError
-        """
+        """Raise UsageError if these are settings of no map."""
         if self.kind not in MAP_KINDS:
             raise UsageError(f"maps: kind: expected one of {', '.join(MAP_KINDS)}, got {self.kind!r}.")
         if not 10 <= self.points <= MOST_POINTS:
@@ -211,12 +206,7 @@ class MapOfScene(Study[str]):
     def rows(self) -> Generator[str, None, None]:
         """Find part after part.
 
-        Raises
-        ------
-        UsageError
-            The scene has no such map.
-        OrbitError
-            The body has several modes, where the map is one of one mode.
+        UsageError: the scene has no such map. OrbitError: the body has several modes, where the map is one of one mode.
         """
         kind = self.settings.kind
         if kind == "square-root":

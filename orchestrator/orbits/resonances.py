@@ -72,13 +72,7 @@ class PeaksOfSweep(RunsStudy[tuple[OrbitEnergies | str, float]]):
             yield row
 
     def made(self) -> xr.Dataset:
-        """Return the peaks.
-
-        Raises
-        ------
-        DatasetError
-            There is none.
-        """
+        """Return the peaks; DatasetError where there is none."""
         self._energies.incomplete = self.incomplete
         exchanged, body, name = self._energies.dataset, impacting_body(self._scene), self._name
         order = [name] if "direction" not in self.runs["outcome"].dims else ["direction", name]
@@ -156,13 +150,7 @@ def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
 
 
 def _peaks(curves: Mapping[str, Floats], frequency: Floats) -> list[_Found]:
-    """Return the peaks of curves, each of shape (branch, frequency).
-
-    Raises
-    ------
-    DatasetError
-        There is none.
-    """
+    """Return the peaks of curves, each of shape (branch, frequency); DatasetError where there is none."""
     found = [
         _Found(quantity, branch, peak)
         for quantity, branches in curves.items()

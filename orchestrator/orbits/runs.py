@@ -45,15 +45,10 @@ class OfRuns(Protocol):
 
 @dataclass(eq=False)
 class RunsStudy(Study[Row]):
-    """A study of the runs of a dataset, or of those of a scene, which are run first.
-
-    Parameters
-    ----------
-    runs : xarray.Dataset
-        As `open_dataset` or `run` gives it.
-    """
+    """A study of the runs of a dataset, or of those of a scene, which are run first."""
 
     runs: xr.Dataset
+    """As `open_dataset` or `run` gives it."""
 
     @classmethod
     def reads(cls, options: OfRuns) -> Sequence[Path]:
@@ -75,10 +70,7 @@ class RunsStudy(Study[Row]):
 def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
     """Open the runs of a dataset; those of a scene are run first.
 
-    Raises
-    ------
-    UsageError
-        The scene is none whose orbits are followed, or a dataset is to be changed.
+    UsageError: the scene is none whose orbits are followed, or a dataset is to be changed.
     """
     if path.is_dir() or path.suffix.lower() == DATASET_ENDING:
         if changes:
@@ -150,12 +142,7 @@ def units_of(dataset: xr.Dataset) -> UnitSystem:
 class OnSweep:
     """Places what belongs to runs on the dimensions of their dataset.
 
-    Attributes
-    ----------
-    dims : tuple of str
-        Dimensions of the runs.
-    coords : dict of str to xarray.Variable
-        Their coordinates, each with a unit and a name in words.
+    `dims` are dimensions of the runs, `coords` their coordinates, each with a unit and a name in words.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:

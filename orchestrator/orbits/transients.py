@@ -193,14 +193,8 @@ class Transients(Study[Floats]):
     def _end(self, distances: Floats, own: RunClass, kind: RunClass, apart: Floats) -> str:
         """Return what became of a start.
 
-        Parameters
-        ----------
-        distances : array
-            From the scene's own motion, period by period.
-        own, kind : RunClass
-            The scene's own motion and that of the start.
-        apart : array, shape (period, variable)
-            From each state of the scene's orbit.
+        Distances are those from the scene's own motion, period by period; `apart`, shape (period, variable), is from
+        each state of the scene's orbit. `own` and `kind` are the classes of the scene's own motion and of the start.
         """
         if np.isnan(distances[-1]):
             return LOST
@@ -274,12 +268,7 @@ def verdict(data: xr.Dataset) -> list[str]:
 
 
 def _refuse(study: Transients) -> None:
-    """Refuse numbers that make no study.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Raise UsageError if numbers make no study."""
     if not 1 <= study.starts <= MOST_STARTS:
         raise UsageError(f"transients: starts: expected 1 to {MOST_STARTS}, got {study.starts}.")
     if not 1 <= study.periods <= MOST_PERIODS:
