@@ -21,35 +21,26 @@ OF_A_STOP = (".position", ".restitution", ".yield_velocity")
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """The modes of a chain or a beam.
-
-    Attributes
-    ----------
-    frequencies, damping_ratios : ndarray, shape (mode,)
-        rad/s, 1.
-    mass : float
-        The modal mass, kg; 1 of a chain.
-    load : ndarray, shape (mode, amplitude)
-        Force on each mode over its mass, for 1 of each amplitude of the forcing.
-    held : ndarray, shape (mode,)
-        Likewise for a constant force of 1 N.
-    observed : ndarray, shape (mode,)
-        Shape at the point that is recorded.
-    contacts : ndarray, shape (contact, mode)
-        At each stop.
-    to_state, from_state : ndarray, shape (element, mode) and (mode, element)
-        From modes to the displacements that are the body's state, and back.
-    """
+    """The modes of a chain or a beam."""
 
     frequencies: Floats
+    """rad/s, shape (mode,)."""
     damping_ratios: Floats
+    """Shape (mode,)."""
     mass: float
+    """The modal mass, kg; 1 of a chain."""
     load: Floats
+    """Force on each mode over its mass, for 1 of each amplitude of the forcing, shape (mode, amplitude)."""
     held: Floats
+    """Likewise for a constant force of 1 N, shape (mode,)."""
     observed: Floats
+    """Each shape at the point that is recorded, shape (mode,)."""
     contacts: Floats
+    """At each stop, shape (contact, mode)."""
     to_state: Floats
+    """From modes to the displacements that are the body's state, shape (element, mode)."""
     from_state: Floats
+    """From these back to modes, shape (mode, element)."""
 
 
 class StructurePoints(BodyPoints):

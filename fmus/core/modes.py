@@ -124,44 +124,23 @@ def beam_modes(boundary: Boundary, count: int) -> BeamModes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualVectors:
-    """What a beam's first modes leave out under forces at some points, as shapes orthogonal to those modes.
-
-    Attributes
-    ----------
-    boundary : str
-        The ends, s = 0 first.
-    natural : int
-        Modes that are kept.
-    points : array, shape (point,)
-        s of the forces.
-    eigenvalues : array, shape (point,)
-        xi, ascending: natural angular frequency = xi^2 sqrt(E I / (mass_per_length L^4)).
-    participation : array, shape (point,)
-        Integral of each shape over s.
-    """
+    """What a beam's first modes leave out under forces at some points, as shapes orthogonal to those modes."""
 
     boundary: Boundary
+    """The ends, s = 0 first."""
     natural: int
+    """Modes that are kept."""
     points: Array
+    """s of the forces, shape (point,)."""
     eigenvalues: Array
+    """xi, ascending, shape (point,): natural angular frequency = xi^2 sqrt(E I / (mass_per_length L^4))."""
     participation: Array
+    """Integral of each shape over s, shape (point,)."""
 
     def shapes(self, points: float | Numbers) -> Array:
-        """Return the shapes, of unit mean square over the length, at points.
+        """Return the shapes, of unit mean square over the length, at points s, 0 to 1; shape (number of points, point).
 
-        Parameters
-        ----------
-        points : float or array of floats
-            s, 0 to 1.
-
-        Returns
-        -------
-        array, shape (number of points, point)
-
-        Raises
-        ------
-        UsageError
-            A point outside of the beam.
+        UsageError: a point is outside of the beam.
         """
         s = _row(points)
         values = np.empty((s.size, self.points.size))
@@ -175,21 +154,9 @@ class ResidualVectors:
 def residual_vectors(boundary: Boundary, natural: int, points: float | Numbers) -> ResidualVectors:
     """Return what the first modes of a beam leave out under forces at some points: equations.md 6.6.
 
-    With them a beam yields to static forces there as much as with all its modes.
-
-    Parameters
-    ----------
-    boundary : str
-        clamped_free, clamped_clamped, clamped_pinned or pinned_pinned; s = 0 first.
-    natural : int
-        Number of modes that are kept, >= 1.
-    points : float or array of floats
-        s of the forces, at most 8, not on a support, no two the same.
-
-    Raises
-    ------
-    UsageError
-        Another boundary, no mode, or points that cannot be told apart.
+    With them a beam yields to static forces there as much as with all its modes. At least one natural mode is kept. The
+    forces act at most at 8 points s, not on a support, no two the same; s = 0 is the first end that the boundary names.
+    UsageError: another boundary, no mode, or points that cannot be told apart.
 
     Examples
     --------

@@ -81,23 +81,12 @@ def stop_parameters(stops: int, floats: Mapping[str, float]) -> dict[tuple[str, 
 class CoupledDriver(RecordedBody):
     """Drives a body and its stops through whole runs.
 
-    Parameters
-    ----------
-    floats, integers : mapping
-        Parameters of the body, as for `BodyDriver`, with the laws of its stops as they are in a scene: each stop
-        gets its own, and the body is told that they are external. Numbers of laws that are external already stay.
-    stops : int
-        Number of stops.
-    macro_step : float
-        Longest communication step, s.
-    exchange : str
-        How values are exchanged; the contacts do not depend on it.
-    body : str
-        Name of the body's FMU: `Oscillator`, `Chain` or `Beam`.
-    others, connections : sequences
-        Further components, such as a Replay, and how they are connected to the body.
-    wrap : callable or None
-        Given a component's name: what wraps the functions of its FMU.
+    The numbers of the body are those of `BodyDriver`, with the laws of its stops as they are in a scene. Each stop gets
+    its own, and the body is told that they are external; numbers of laws that are external already stay. `macro_step`
+    is the longest communication step, s; `exchange` says how values are exchanged, on which contacts do not depend.
+    `body` names the body's FMU: `Oscillator`, `Chain` or `Beam`. `others` are further components, such as a Replay, and
+    `connections` say how they are connected to the body. `wrap` is given a component's name, and returns what wraps the
+    functions of its FMU.
     """
 
     def __init__(

@@ -140,33 +140,14 @@ class BodyDriver(RecordedBody):
         exciter: HeldExciter | None = None,
         recording: bool = False,
     ) -> NDArray[np.float64]:
-        """Advance from sample to sample by one call, a force held before each.
+        """Advance from sample to sample by one call, a force held before each; return outputs, shape (sample, output).
 
-        Parameters
-        ----------
-        ends : ndarray, shape (sample,)
-            s, ascending, after the time reached.
-        forces : ndarray, shape (sample,), or None
-            N, each held until the sample at its place; V of an exciter. None: the force stays as it is.
-        outputs : sequence of str
-            Variables of the body that are read at each sample.
-        renewed : ndarray of uint8, shape (sample,), optional
-            Whether the force is made anew where the step to a sample begins; left out, before each.
-        exciter : HeldExciter or None
-            Makes the forces of voltages.
-        recording : bool
-            Whether the body records as `record` says; else it records nothing from the first call on.
-
-        Returns
-        -------
-        ndarray, shape (sample, output)
-
-        Raises
-        ------
-        ImpactLimitReached, DeadlineReached
-            At the limit of impacts of the run, or after its deadline; they have the samples before.
-        ComponentError
-            The body fails, or touches the exciter.
+        The ends, s, ascend from the time reached. A force, N, is held until the sample at its place; of an exciter it
+        is a voltage, V. Without forces the force stays as it is. `renewed` says by 1 where the force is made anew as
+        the step to a sample begins; left out, before each. `outputs` are variables of the body, read at each sample.
+        With `recording` it records as `record` says; else it records nothing from the first call on.
+        ImpactLimitReached, DeadlineReached: the run ends before, and they have its samples. ComponentError: the body
+        fails, or touches the exciter.
         """
         if recording:
             self._held = None  # the next block that does not record says so

@@ -37,23 +37,11 @@ COUNTED_FROM_ONE = np.array([0.0, 0.0, 1.0])
 
 
 class GeneralRunner(Runner):
-    """Runs points of one general scene in this process, with component instances that are used again.
+    """Runs points of one scene of components in this process, with component instances that are used again.
 
-    Parameters
-    ----------
-    scene : Scene
-        A scene with components.
-    execution : str
-        `coupled`, or `auto`, which takes it.
-    log, wrap : callable or None
-        Given a component's name: where its log lines go, and what wraps the functions of its FMU.
-
-    Attributes
-    ----------
-    execution, instruction_set : str
-        `coupled`; machine architecture.
-    fmu_hashes : dict of str to str
-        SHA-256 of each component's FMU.
+    `execution` is `coupled`, or `auto`, which takes it. `log` and `wrap` are given a component's name: where its log
+    lines go, and what wraps the functions of its FMU. Of the identity of a runner, `instruction_set` is the machine
+    architecture and `fmu_hashes` has the SHA-256 of each component's FMU.
     """
 
     def __init__(
@@ -115,10 +103,7 @@ class GeneralRunner(Runner):
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point from the scene's start values; a general scene carries no state over.
 
-        Raises
-        ------
-        ComponentError
-            A component fails; the error names instance, function and time.
+        ComponentError: a component fails, with its instance, function and time.
         """
         began = time.perf_counter()
         scene = self.scene.at(values) if values else self.scene

@@ -25,23 +25,16 @@ MOST_SENSORS = 4
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Who cannot take something of a scene.
-
-    Attributes
-    ----------
-    lanes : bool
-        Whether lanes leave the scene; of modes that are coupled, or none, they leave each point.
-    orbits : str
-        What a search for orbits expects in its place.
-    pushed, thrown_back : str
-        Why no force acts at its stops on a body that knows nothing of them, and why its state after an impact on a
-        rigid stop does not follow from its modes or masses.
-    """
+    """Who cannot take something of a scene."""
 
     lanes: bool = False
+    """Whether lanes leave the scene; of modes that are coupled, or none, they leave each point."""
     orbits: str = ""
+    """What a search for orbits expects in its place."""
     pushed: str = ""
+    """Why no force acts at its stops on a body that knows nothing of them."""
     thrown_back: str = ""
+    """Why its state after an impact on a rigid stop does not follow from its modes or masses."""
 
 
 _NONE = "0 where orbits are followed"

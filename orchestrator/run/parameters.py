@@ -64,12 +64,8 @@ def exported_floats(scene: Scene) -> dict[str, float]:
 def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
     """Return the numbers of a table of a scene by the names that its fields say they have in the FMU, SI.
 
-    Parameters
-    ----------
-    table : BaseModel
-        What it leaves out, and has no default, is left out.
-    size : int
-        Elements of each array, masses or modes: as given, one for all, or 0 for those at the end left out.
+    What the table leaves out, and has no default, is left out. `size` is the number of elements of each array, masses
+    or modes. One number is that of all of them; those that are left out at the end are 0.
     """
     parameters: dict[str, float] = {}
     for variable in fmu_variables_of(type(table)):
@@ -99,13 +95,7 @@ def _exciter_floats(scene: Scene, exciter: Exciter, forced: Mapping[str, float])
 
 
 def refuse_unknown_modes(scene: Scene) -> None:
-    """Refuse to run a scene of which it is not yet known how many modes it has.
-
-    Raises
-    ------
-    UsageError
-        It has `modes = "auto"`.
-    """
+    """Refuse to run a scene with `modes = "auto"`, of which it is not yet known how many modes it has: UsageError."""
     if scene.body.finds_modes:
         raise UsageError(
             f'{scene.source}: body.modes: expected a number of modes, got "auto". run and campaign find it; '

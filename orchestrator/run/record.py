@@ -34,13 +34,7 @@ TOUCH_DOWN = ("last_time", "last_phase", "last_velocity")
 
 
 class RunEnded(Exception):
-    """A run ends before its end, with what it has.
-
-    Attributes
-    ----------
-    samples : ndarray, shape (sample, output)
-        The samples of a block before its end.
-    """
+    """A run ends before its end, with what it has: the samples of a block before its end, shape (sample, output)."""
 
     def __init__(self, samples: NDArray[np.float64] | None = None) -> None:
         self.samples = np.empty((0, 0)) if samples is None else samples
@@ -165,10 +159,7 @@ def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 def impact_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the impacts of a record with the largest force of each, NaN where the stop does not yield; shape (n, 8).
 
-    Parameters
-    ----------
-    rows : ndarray, shape (row, 8)
-        As a body has written them: the row of a largest force comes after that of its impact.
+    The rows, of eight columns, are as a body has written them: that of a largest force comes after that of its impact.
     """
     places = np.flatnonzero(rows[:, 0] == ROW_IMPACT)
     found = np.full((len(places), IMPACT_WIDTH), np.nan)
@@ -183,12 +174,7 @@ def open_contacts(
 ) -> NDArray[np.float64]:
     """Return the impacts of contacts that are open, shape (n, 8): all that is known at their end is NaN.
 
-    Parameters
-    ----------
-    touch_downs : ndarray, shape (n, 3)
-        Columns `TOUCH_DOWN`.
-    contacts : ndarray, shape (n,)
-        Numbers of the contacts, from 1.
+    The rows of `touch_downs` have the columns `TOUCH_DOWN`; contacts are numbered from 1.
 
     Examples
     --------
@@ -220,15 +206,8 @@ class Rows:
 class RecordedBody(ABC):
     """A body whose runs are driven; its subclasses say how it is stepped.
 
-    Parameters
-    ----------
-    group : callable
-        Makes a group of the body's variables: kind, names, number of values (None: one for each name).
-
-    Attributes
-    ----------
-    warnings : tuple of str
-        What the body had to say when the run began; it goes with the results.
+    `group` makes a group of the body's variables: kind, names, number of values (None: one for each name). `warnings`
+    are what the body had to say when the run began; they go with the results.
     """
 
     def __init__(self, group: Callable[[str, Sequence[str], int | None], VariableGroup]) -> None:
@@ -255,18 +234,9 @@ class RecordedBody(ABC):
     ) -> None:
         """Say what of the body is read; nothing else costs a call.
 
-        Parameters
-        ----------
-        contacts : int
-            Contact ports in use.
-        sampled : sequence of str
-            Variables of a time series.
-        state : sequence of str
-            Variables that are the whole state, where it is more than the observed point.
-        energies : bool
-            Whether the body follows its energies while it records.
-        slowest : bool
-            Whether the body can tell its lowest natural frequency.
+        `contacts` is the number of ports in use, `sampled` are the variables of a time series. `state` are those that
+        are the whole state, where it is more than the observed point. `energies` has the body follow its energies while
+        it records; `slowest` says that it can tell its lowest natural frequency.
         """
         ports = [f"contact[{k}]" for k in range(1, contacts + 1)]
         self._stuck = self._some("Boolean", [f"{port}.stuck" for port in ports])
@@ -299,10 +269,7 @@ class RecordedBody(ABC):
     def advance(self, end: float) -> None:
         """Advance to time `end`, s, looking at the clock and for signals on the way.
 
-        Raises
-        ------
-        ImpactLimitReached, DeadlineReached
-            The run ends before.
+        ImpactLimitReached, DeadlineReached: the run ends before.
         """
 
     @abstractmethod
@@ -325,10 +292,7 @@ class RecordedBody(ABC):
     def take_rows(self) -> None:
         """Take the rows that the body has recorded since the last time.
 
-        Raises
-        ------
-        ComponentError
-            Rows are lost: whoever drives the body has not emptied its record in time.
+        ComponentError: rows are lost, as whoever drives the body has not emptied its record in time.
         """
         count, lost = self._counts.get().tolist()
         if lost:
@@ -374,21 +338,10 @@ class RecordedBody(ABC):
         return float(displacement), float(velocity)
 
     def advance_sampling(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Advance from one instant to the next, as `advance`; return the sampled variables at each.
+        """Advance from one instant to the next, as `advance`; return the sampled variables, shape (instant, variable).
 
-        Parameters
-        ----------
-        times : ndarray, shape (instant,)
-            s, ascending; the first is not before the time reached.
-
-        Returns
-        -------
-        ndarray, shape (instant, variable)
-
-        Raises
-        ------
-        ImpactLimitReached, DeadlineReached
-            The run ends before; they have the samples so far.
+        The times ascend, s; the first is not before the time reached. ImpactLimitReached, DeadlineReached have the
+        samples so far.
         """
         rows: list[NDArray[np.float64]] = []
         try:

@@ -22,27 +22,12 @@ _FOLLOWED = ("modal_energy[", "energy.")
 
 
 class TimeSeriesPlan:
-    """What a scene samples.
+    """What a scene of the short form samples: `names`, or else what its `record.time_series` names.
 
-    Parameters
-    ----------
-    scene : Scene
-        A scene of the short form.
-    names : sequence of str, optional
-        What is sampled, in place of what the scene's `record.time_series` names.
-
-    Attributes
-    ----------
-    all_names : tuple of str
-        The sampled variables, as the scene names them; empty without a time series.
-    names : tuple of str
-        Those that are no channels of a measuring chain.
-    variables : tuple of str
-        The variables of the body's FMU that they are made of, each once.
-    energies : bool
-        Whether the body must follow its energies for them.
-    feels_contacts : bool
-        Whether a contact with a stop that yields shows in them: in a force or an acceleration.
+    Of its attributes, `all_names` are the sampled variables as the scene names them, empty without a time series;
+    `names` those that are no channels of a measuring chain; `variables` those of the body's FMU that they are made of,
+    each once. `energies` says that the body must follow its energies for them; `feels_contacts` that a contact with a
+    stop that yields shows in them, in a force or an acceleration.
     """
 
     def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
@@ -72,18 +57,9 @@ class TimeSeriesPlan:
         parameters: Mapping[str, float],
         time: float,
     ) -> Sequence[float]:
-        """Return the sampled variables at one instant.
+        """Return the sampled variables at one instant, s, of what the FMU says, shape (variables,).
 
-        Parameters
-        ----------
-        values : ndarray, shape (variables,)
-            What the FMU says.
-        forcing : Forcing or None
-            What drives the body.
-        parameters : mapping of str to float
-            Parameters of the body, see `parameters.float_parameters`.
-        time : float
-            s.
+        The parameters are the body's, see `parameters.float_parameters`; `forcing` drives it.
         """
         cosine = 0.0
         if forcing is not None:
@@ -119,20 +95,9 @@ class TimeSeriesPlan:
         parameters: Mapping[str, float],
         times: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return the sampled variables at many instants, those of `names`: as `row`.
+        """Return the sampled variables at many instants, those of `names`, shape (instant, name): as `row`.
 
-        Parameters
-        ----------
-        values : ndarray, shape (instant, variable)
-            What the FMU says.
-        variables : sequence of str
-            What its columns are, those of `variables` among them.
-        forcing, parameters, times
-            As of `row`; times have the shape (instant,).
-
-        Returns
-        -------
-        ndarray, shape (instant, name)
+        What the FMU says has the shape (instant, variable); `variables` name its columns, those of the plan among them.
         """
         place = {name: column for column, name in enumerate(variables)}
         own = [place[name] for name in self.variables]
@@ -151,14 +116,8 @@ class TimeSeriesPlan:
 def few_samples_message(durations: NDArray[np.float64], rate: float, *, has_peaks: bool) -> str:
     """Return what a run says whose contacts have too few samples for their largest forces; empty where none has.
 
-    Parameters
-    ----------
-    durations : ndarray, shape (impact,)
-        Of contacts, s; 0 of a rigid stop, NaN of one that has not ended.
-    rate : float
-        Of the samples, Hz.
-    has_peaks : bool
-        Whether impacts are recorded, and their largest forces with them.
+    Durations of contacts are in s, 0 of a rigid stop, NaN of one that has not ended; the rate is in Hz. `has_peaks`
+    says that impacts are recorded, and their largest forces with them.
 
     Examples
     --------

@@ -36,12 +36,7 @@ def recorded_window(scene: Scene, parameters: Mapping[str, float]) -> tuple[floa
 def forced_window(record: Record, phase: Numbers, angular_frequency: Numbers) -> tuple[Numbers, Numbers]:
     """Return start and end of the recording of a forced scene, s; of one point, or of many as arrays.
 
-    Parameters
-    ----------
-    record : Record
-        Its `[record]`.
-    phase, angular_frequency : float or ndarray
-        Of the force at time 0, rad, and rad/s.
+    The phase is that of the force at time 0, rad; its angular frequency is in rad/s.
     """
     period, lead = TWO_PI / angular_frequency, phase % TWO_PI
     lag = lead / angular_frequency

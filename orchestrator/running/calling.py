@@ -158,13 +158,9 @@ class SceneRunner:
 
 
 class _SoundValues:
-    """Values of keys that a scene takes: all between those that were checked, as the rules of its sweeps are intervals.
+    """Values of keys that a scene without a sweep takes.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    keys : sequence of str
+    They are all between those that were checked, as the rules of its sweeps are intervals.
     """
 
     def __init__(self, scene: Scene, keys: Sequence[str]) -> None:
@@ -183,10 +179,7 @@ class _SoundValues:
     def take(self, points: Floats) -> Scene:
         """Check points, shape (point, key), as those of a campaign; return the scene that sweeps them.
 
-        Raises
-        ------
-        SceneError
-            With all that is wrong with them, each on one line.
+        SceneError: all that is wrong with them, each on one line.
         """
         swept = self._swept([sorted(set(column)) for column in points.T.tolist()])
         if not self._has_gaps:

@@ -94,13 +94,7 @@ def run_whole(opened: OpenedScene, progress: Progress | None = None) -> xr.Datas
 
 
 def refuse_adaptive(scene: Scene) -> None:
-    """Refuse a scene whose points are found round by round.
-
-    Raises
-    ------
-    UsageError
-        With what to do.
-    """
+    """Refuse a scene whose points are found round by round: UsageError, with what to do."""
     if most_points(scene.sweep) is not None:
         raise UsageError(
             f"{scene.source}: sweep: expected points that are known before the first is computed, got adaptive axes. "

@@ -77,10 +77,7 @@ class ComponentNumbers:
     def value(self, key: str) -> float:
         """Return the number that `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].NAME` has.
 
-        Raises
-        ------
-        UsageError
-            When the scene gives no such number.
+        UsageError: the scene gives no such number.
         """
         if is_step(self.components, key):
             return self.macro_step
@@ -100,10 +97,7 @@ class ComponentNumbers:
     def at(self, values: Mapping[str, float]) -> ComponentNumbers:
         """Return other start values, gains and numbers of contacts, without validating them again.
 
-        Raises
-        ------
-        UsageError
-            For a key that is neither swept nor given in the scene.
+        UsageError: a key is neither swept nor given in the scene.
         """
         parts, macro_step = self._parts(), self.macro_step
         for key, value in values.items():

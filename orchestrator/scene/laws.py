@@ -10,18 +10,12 @@ from vibroimpact.orchestrator.scene.models import Stop
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """What a contact law is.
-
-    Attributes
-    ----------
-    is_rigid : bool
-        Whether its stop answers with an impulse; else it yields, and answers with a force.
-    is_integrated : bool
-        Whether its contacts have no closed form: their error is `execution.contact_tolerance`.
-    """
+    """What a contact law is."""
 
     is_rigid: bool = False
+    """Whether its stop answers with an impulse; else it yields, and answers with a force."""
     is_integrated: bool = False
+    """Whether its contacts have no closed form: their error is `execution.contact_tolerance`."""
 
 
 LAWS = {

@@ -47,10 +47,7 @@ def off_balance(samples: Floats) -> Floats:
 def balance_of(scene: Scene) -> float:
     """Return the largest relative error of the balance of a run; NaN of a body that does not follow its energies.
 
-    Parameters
-    ----------
-    scene : Scene
-        Of the short form, without a sweep. It is run once more, since energies take time.
+    The scene, of the short form and without a sweep, is run once more, since energies take time.
     """
     if not scene.is_lone_body or not scene.body.IS_STRUCTURE:
         return math.nan

@@ -31,48 +31,29 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Convergence:
-    """How many modes a scene takes.
-
-    Attributes
-    ----------
-    modes : int
-        The fewest that meet the tolerance.
-    error : float
-        Their estimated error, relative.
-    checked_with : int
-        The most modes that they were compared with.
-    by : str
-        `motion`, or `statistics` where motion is chaotic.
-    errors : dict of int to float
-        Distance of each number of modes that was tried from the most that it was compared with, the largest of all
-        points; inf: an impact is missing.
-    """
+    """How many modes a scene takes."""
 
     modes: int
+    """The fewest that meet the tolerance."""
     error: float
+    """Their estimated error, relative."""
     checked_with: int
+    """The most modes that they were compared with."""
     by: str
+    """`motion`, or `statistics` where motion is chaotic."""
     errors: dict[int, float]
+    """Distance of each number of modes that was tried from the most that it was compared with, the largest of all
+    points; inf: an impact is missing.
+    """
 
 
 class ModeRuns:
     """Runs of one point with different numbers of modes, each made once.
 
-    Parameters
-    ----------
-    scene : Scene
-        With `modes = "auto"`, without a sweep.
-    tolerance : float
-        Relative, of all that is recorded (`errors.errors_of`); in chaotic motion of the statistics of its impacts.
-    note : callable
-        Told of each run that takes longer than a second.
-    where : str
-        The point of a sweep, for messages; empty without one.
-
-    Raises
-    ------
-    SceneError
-        The scene does not run.
+    The scene has `modes = "auto"` and no sweep. The tolerance is relative, of all that is recorded
+    (`errors.errors_of`); in chaotic motion of the statistics of its impacts. `note` is told of each run that takes
+    longer than a second. `where` is the point of a sweep, for messages; empty without one. SceneError: the scene does
+    not run.
     """
 
     def __init__(
@@ -213,17 +194,7 @@ def converged_modes(points: Sequence[ModeRuns], tolerance: float) -> Convergence
     The number of modes is doubled until one run differs little enough from the next, and that one from the next but
     one; between the last two the fewest are then found by bisection. The estimated error is the distance from the
     finest run plus that run's own. Of a chain the finest has all modes, and no error; a chain that meets the tolerance
-    with none fewer takes all.
-
-    Parameters
-    ----------
-    points : sequence of ModeRuns
-    tolerance : float
-
-    Raises
-    ------
-    SceneError
-        A point does not meet it with any number of modes.
+    with none fewer takes all. SceneError: a point does not meet it with any number of modes.
     """
     runs = _Jointly(points, tolerance)
     for coarse, fine in pairwise(runs.ladder):

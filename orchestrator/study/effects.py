@@ -66,56 +66,41 @@ Change = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Something that a scene asks for, and the scene without it.
-
-    Attributes
-    ----------
-    name : str
-        In words.
-    asked_by : str
-        The key that asks for it.
-    base, without : Scene
-        The scene with it and without it. What moves is compared without a time series, whose samples take most of the
-        time: else nothing could be told of the rest.
-    keeps_motion : bool
-        Whether what moves is the same without it: it only says what is kept, or how points run.
-    """
+    """Something that a scene asks for, and the scene without it."""
 
     name: str
+    """In words."""
     asked_by: str
+    """The key that asks for it."""
     base: Scene
+    """The scene with it. What moves is compared without a time series: its samples take most of the time, and would
+    hide the rest.
+    """
     without: Scene
+    """The scene without it."""
     keeps_motion: bool = False
+    """Whether what moves is the same without it: it only says what is kept, or how points run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """An effect with what it costs and changes.
-
-    Attributes
-    ----------
-    effect : Effect
-    seconds : ndarray, shape (pair,)
-        Processor time that it costs in each pair of runs, s; negative where the run without it took longer.
-    full : float
-        Median processor time of a run of the scene, s.
-    changes : str
-        What is otherwise without it, in words.
-    change : float
-        Largest relative change of what both runs show; NaN where they cannot be compared.
-    motions : tuple of Motion, or None
-        What the motions with and without it are as a whole, where impacts are lost or a motion is chaotic.
-    statistics : Statistics or None
-        Likewise how far distributions are apart, of a replay and of a general scene.
-    """
+    """An effect with what it costs and changes."""
 
     effect: Effect
     seconds: np.ndarray[Any, Any]
+    """Processor time that it costs in each pair of runs, s, shape (pair,); negative where the run without it took
+    longer.
+    """
     full: float
+    """Median processor time of a run of the scene, s."""
     changes: str
+    """What is otherwise without it, in words."""
     change: float
+    """Largest relative change of what both runs show; NaN where they cannot be compared."""
     motions: tuple[Motion, Motion] | None = None
+    """What the motions with and without it are as a whole, where impacts are lost or a motion is chaotic."""
     statistics: Statistics | None = None
+    """Likewise how far distributions are apart, of a replay and of a general scene."""
 
     @property
     def share(self) -> float:
@@ -129,14 +114,7 @@ class Share:
 
 
 def effects_of(scene: Scene) -> list[Effect]:
-    """Return what a scene asks for that it could leave out, each with the scene without it.
-
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-
-    """
+    """Return what a scene without a sweep asks for that it could leave out, each with the scene without it."""
     found = list(_found(scene))
     return [effect for effect in found if effect is not None]
 
@@ -319,15 +297,7 @@ def _only_fused(document: dict[str, Any]) -> None:
 
 
 def shares_of(scene: Scene, effects: Sequence[Effect]) -> Generator[Share, None, None]:
-    """Run a scene with and without each effect, in turn, and yield what each costs and changes.
-
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    effects : sequence of Effect
-        Of this scene.
-    """
+    """Run a scene without a sweep with and without each of its effects, in turn; yield what each costs and changes."""
     compared = _Compared(scene)
     with opened(scene) as full:
         whole = float(np.median([clock.CLOCK.processor_time(full) for _ in range(PAIRS)]))
@@ -364,12 +334,9 @@ def _share(effect: Effect, whole: float, compared: _Compared) -> Share:
 
 
 class _Compared:
-    """Compares runs with and without an effect: impact by impact, else by what the motions are as a whole.
+    """Compares runs with and without an effect of a scene: impact by impact, else by what the motions are as a whole.
 
-    Parameters
-    ----------
-    scene : Scene
-        With all of its effects.
+    The scene has all of its effects.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -25,40 +25,26 @@ COMPARED = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """What errors are relative to.
-
-    Attributes
-    ----------
-    time : float
-        The forcing period, or the time recorded where there is none, s.
-    window : tuple of float
-        Start and end of the recording, s: an impact at its edge may be in one way and not in another.
-    masses : tuple of float
-        What hits each stop, kg: energy is relative to that of the impacts; empty where nobody knows.
-    """
+    """What errors are relative to."""
 
     time: float
+    """The forcing period, or the time recorded where there is none, s."""
     window: tuple[float, float]
+    """Start and end of the recording, s: an impact at its edge may be in one way and not in another."""
     masses: tuple[float, ...] = ()
+    """What hits each stop, kg: energy is relative to that of the impacts; empty where nobody knows."""
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """The errors of a way.
-
-    Attributes
-    ----------
-    of : mapping of str to float
-        By quantity, relative; NaN where the way does not tell it, or the reference does not.
-    failure : str
-        What is wrong altogether; empty where nothing is.
-    growth : ndarray, shape (impact,)
-        Relative error of the velocity of each compared impact, in their order.
-    """
+    """The errors of a way."""
 
     of: Mapping[str, float]
+    """By quantity, relative; NaN where the way does not tell it, or the reference does not."""
     failure: str
+    """What is wrong altogether; empty where nothing is."""
     growth: Floats
+    """Relative error of the velocity of each compared impact, in their order, shape (impact,)."""
 
     def worst(self, quantity: str = "all") -> float:
         """Return the error of a quantity, or the largest of all that are known; NaN where none is."""
@@ -78,12 +64,7 @@ def errors_of(
 ) -> Errors:
     """Compare what a way showed with the reference.
 
-    Parameters
-    ----------
-    found, reference : Observation
-    scales : Scales
-    impacts : int, optional
-        Compare no more than so many impacts, and nothing else: what chaos leaves comparable.
+    `impacts` compares no more than so many impacts, and nothing else: what chaos leaves comparable.
     """
     if found.failure:
         return no_errors(found.failure)
@@ -146,13 +127,8 @@ def matched(
 ) -> tuple[np.ndarray, str]:
     """Return which impacts are the same ones (places in both), and what is missing or too much, in words.
 
-    Parameters
-    ----------
-    found, reference : ndarray, shape (impact, 3)
-        Time, velocity, contact; in the order of time.
-    scales : Scales
-    most : int, optional
-        Take no more than the first so many of the reference.
+    Impacts are in the order of time, shape (impact, 3): time, velocity, contact. Of the reference no more than the
+    first `most` are taken.
     """
     own, other = _compared(found), _compared(reference)
     if most is not None:

@@ -34,15 +34,7 @@ def measuring_changes(scene: Scene) -> Iterator[tuple[str, str, Change]]:
 def motion_alone(scene: Scene) -> Scene:
     """Return a scene without its measuring chain, in which the same moves: its forcing is in N.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-
-    Raises
-    ------
-    UsageError
-        The force of its exciter falls with the distance, or has a constant part.
+    The scene has no sweep. UsageError: the force of its exciter falls with the distance, or has a constant part.
     """
     document = parse_toml(scene.text)
     if not any(name in document for name in CHAIN_TABLES):

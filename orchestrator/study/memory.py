@@ -25,27 +25,14 @@ IS_MEASURED = sys.platform == "linux"
 def memory_of_ways(
     scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float = math.inf
 ) -> dict[int, int]:
-    """Return the largest resident memory that ways add to a process, Python's and that of the FMUs, bytes.
+    """Return the largest resident memory that ways add to a process, by place, Python's and that of the FMUs, bytes.
 
     A process is started that loads this package and nothing else; each way is opened and run once in a fork of it, so
-    that none finds what another has left. Libraries of FMUs and Python modules that a way loads count, too.
-
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    given : mapping of str to Any
-        What `ways_of` is given beside the scene.
-    parts : sequence of (int, float)
-        Place of each way that is measured, in the order of `ways_of`, and the part of the time that it simulates.
-    seconds : float
-        Processor time, s, after which no further way is measured.
-
-    Returns
-    -------
-    dict of int to int
-        By place; what a process that died would have taken is missing, and ways for which no time was left. Nothing
-        where the system does not tell, or the FMUs run in processes of their own.
+    that none finds what another has left. Libraries of FMUs and Python modules that a way loads count, too. The scene
+    has no sweep; `given` is what `ways_of` is given beside it. Of each way that is measured `parts` have its place, in
+    the order of `ways_of`, and the part of the time that it simulates. After so many seconds of processor time no
+    further way is measured. What a process that died would have taken is missing, and ways for which no time was left.
+    Nothing is there where the system does not tell, or the FMUs run in processes of their own.
     """
     guarded = scene.execution.guard
     if guarded or not IS_MEASURED:

@@ -59,24 +59,16 @@ CHAOS = "chaotic"
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What one run showed as a whole.
-
-    Attributes
-    ----------
-    of : mapping of str to float
-        By quantity: m, m/s, J, J; NaN where it is not known, as the velocity of no impacts is.
-    impacts : int
-        How many were recorded.
-    orbit : str
-        `P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it.
-    sampling : mapping of str to float
-        By quantity, the largest relative difference among runs from slightly different numbers; empty without chaos.
-    """
+    """What one run showed as a whole."""
 
     of: Mapping[str, float]
+    """By quantity: m, m/s, J, J; NaN where it is not known, as the velocity of no impacts is."""
     impacts: int
+    """How many were recorded."""
     orbit: str
+    """`P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it."""
     sampling: Mapping[str, float] = field(default_factory=dict)
+    """By quantity, the largest relative difference among runs from slightly different numbers; empty without chaos."""
 
     @property
     def chaotic(self) -> bool:
@@ -87,10 +79,7 @@ class Motion:
 def motion_of(scene: Scene) -> Motion | None:
     """Run a scene of the short form or a replay and return what its motion is as a whole; None where it fails.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep. Of a replay the impacts alone are known.
+    The scene has no sweep. Of a replay the impacts alone are known.
     """
     followed, scales = _followed(scene), scales_of(scene)
     found = observed(followed)
@@ -206,12 +195,7 @@ def change_in_words(change: float, sampling: float) -> str:
 def values_of_motions(
     motions: Sequence[tuple[Motion, Motion] | None], statistics: Sequence[Statistics | None]
 ) -> dict[str, Any]:
-    """Return the values of `OF_MOTIONS`: what motions are as a whole, with an effect and without it.
-
-    Parameters
-    ----------
-    motions, statistics : sequence, shape (effect,)
-    """
+    """Return the values of `OF_MOTIONS`: what motions are as a whole, with and without each effect, shape (effect,)."""
     none = Motion(dict.fromkeys(QUANTITIES, math.nan), -1, "")
     pairs = [pair or (none, none) for pair in motions]
     missing = Statistics(math.nan, math.nan, math.nan, math.nan)

@@ -25,50 +25,36 @@ def _no_impacts() -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What one run showed while it was recorded.
-
-    Attributes
-    ----------
-    impacts : ndarray, shape (impact, 3)
-        Time (s), velocity (m/s), contact (1-based) of each impact.
-    lowest, highest : float
-        Smallest and largest displacement, m; NaN where this way does not tell.
-    final : tuple of float
-        Displacement (m) and velocity (m/s) at the end.
-    energy_residual : float
-        Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged.
-    energy_balance : float
-        Largest error of the balance of a body's energies, relative; NaN where nobody followed them.
-    samples : ndarray, shape (sample, variable), or None
-        What a general scene samples, or a replay reads, without the time.
-    sample_times : ndarray, shape (sample,), or None
-        When a replay reads, s; None where the samples of all ways are of the same instants.
-    seconds : float
-        Wall time, s.
-    failure : str
-        Why there is no result, or what is wrong with it; empty where it is one.
-    variance : float
-        Least variance accounted for among the channels that a replay is compared with, percent; else NaN.
-    reached : float
-        How far a run came that was given up, over its whole time; NaN where the way does not tell.
-    held : OrbitClass
-        `sticking` where impacts are without number (a complete chatter, or a rest on a stop), `rest` where the body
-        rests for good, else `unknown`; the class of the run goes by it.
-    """
+    """What one run showed while it was recorded."""
 
     impacts: Floats = field(default_factory=_no_impacts)
+    """Time (s), velocity (m/s), contact (1-based) of each impact, shape (impact, 3)."""
     lowest: float = math.nan
+    """Smallest displacement, m; NaN where this way does not tell."""
     highest: float = math.nan
+    """Largest displacement, m; likewise."""
     final: tuple[float, float] = (math.nan, math.nan)
+    """Displacement (m) and velocity (m/s) at the end."""
     energy_residual: float = math.nan
+    """Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged."""
     energy_balance: float = math.nan
+    """Largest error of the balance of a body's energies, relative; NaN where nobody followed them."""
     samples: Floats | None = None
+    """What a general scene samples, or a replay reads, without the time, shape (sample, variable)."""
     sample_times: Floats | None = None
+    """When a replay reads, s, shape (sample,); None where the samples of all ways are of the same instants."""
     seconds: float = math.nan
+    """Wall time, s."""
     failure: str = ""
+    """Why there is no result, or what is wrong with it; empty where it is one."""
     variance: float = math.nan
+    """Least variance accounted for among the channels that a replay is compared with, percent; else NaN."""
     reached: float = math.nan
+    """How far a run came that was given up, over its whole time; NaN where the way does not tell."""
     held: OrbitClass = OrbitClass.unknown
+    """`sticking` where impacts are without number (a complete chatter, or a rest on a stop), `rest` where the body
+    rests for good, else `unknown`; the class of the run goes by it.
+    """
 
     @property
     def displacement_range(self) -> float:
@@ -77,13 +63,7 @@ class Observation:
 
 
 def observation_of(record: RunRecord) -> Observation:
-    """Return what the record of a run shows.
-
-    Parameters
-    ----------
-    record : RunRecord
-        Of a scene of either form.
-    """
+    """Return what the record of a run shows, of a scene of either form."""
     failure = ""
     if record.outcome == Outcome.timeout:
         failure = LATE

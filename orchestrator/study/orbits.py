@@ -20,15 +20,8 @@ def orbit_of(found: Observation, period: float | None, window: tuple[float, floa
     """Return the class of an orbit: `P(p,q)`, `no impacts`, `not periodic in the recording`; nothing where unforced.
 
     A complete chatter is `P(inf,q)` and a body that rests for good is at `rest`, as `classify` names them. The slowest
-    impacts of a chatter do not tell whether it repeats: their number is the engine's.
-
-    Parameters
-    ----------
-    found : Observation
-    period : float or None
-        Of the forcing, s.
-    window : tuple of float
-        Start and end of the recording, s.
+    impacts of a chatter do not tell whether it repeats: their number is the engine's. The period is that of the
+    forcing, s; the window is start and end of the recording, s.
 
     Examples
     --------

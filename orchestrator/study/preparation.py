@@ -124,14 +124,8 @@ def round_off(error: float) -> float | str:
 def _what(points: int, of_modes: int, told: int) -> str:
     """Return what an error is estimated of, in words.
 
-    Parameters
-    ----------
-    points : int
-        Points of the sweep at which the solution was looked at.
-    of_modes : int
-        Those at which numbers of modes were compared; 0 where none were.
-    told : int
-        Points whose motion is not chaotic.
+    `points` counts those of the sweep at which the solution was looked at, `told` those whose motion is not chaotic.
+    `of_modes` counts those at which numbers of modes were compared; 0 where none were.
     """
     parts = [
         *([f"the number of modes{_largest(of_modes)}"] if of_modes else []),

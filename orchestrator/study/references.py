@@ -46,31 +46,20 @@ CONTACT_SAFETY = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """What errors are measured against.
-
-    Attributes
-    ----------
-    observation : Observation
-    name : str
-        Where it comes from, in words.
-    error : mapping of str to float
-        By quantity, how far it may be off itself, relative.
-    sensitivity : float
-        Relative change of the motion over that of a number of the scene; NaN where none could be changed.
-    chaotic : bool
-        Whether nothing but statistics can be compared after the first impacts.
-    scales : Scales
-    best : Scene
-        What was run for it.
-    """
+    """What errors are measured against."""
 
     observation: Observation
     name: str
+    """Where it comes from, in words."""
     error: Mapping[str, float]
+    """By quantity, how far it may be off itself, relative."""
     sensitivity: float
+    """Relative change of the motion over that of a number of the scene; NaN where none could be changed."""
     chaotic: bool
+    """Whether nothing but statistics can be compared after the first impacts."""
     scales: Scales
     best: Scene
+    """What was run for it."""
 
 
 def _finest_exchange(scene: Scene) -> Reference:
@@ -132,13 +121,7 @@ def scales_of(scene: Scene, part: float = 1.0) -> Scales:
 
 
 def reference_of(scene: Scene) -> Reference:
-    """Return the reference of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    """
+    """Return the reference of a scene without a sweep."""
     if not scene.is_one_body:
         return _finest_exchange(scene)
     scales, integrated, best = scales_of(scene), integrates_contacts(scene.stops), best_of(scene)

@@ -17,38 +17,26 @@ LEAST_IMPACTS = 20
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """How far the statistics of a run are from those of the reference, and how far chance alone takes them.
-
-    Attributes
-    ----------
-    mean_interval_error, mean_interval_sampling : float
-        Relative difference of the mean interval between impacts, and the largest among runs of the reference.
-    distribution_distance, distribution_sampling : float
-        Distance between the distributions of impact velocity (Kolmogorov-Smirnov), and likewise; where no impacts are
-        known, of what is sampled, the largest.
-    """
+    """How far the statistics of a run are from those of the reference, and how far chance alone takes them."""
 
     mean_interval_error: float
+    """Relative difference of the mean interval between impacts."""
     mean_interval_sampling: float
+    """The largest among runs of the reference."""
     distribution_distance: float
+    """Distance between the distributions of impact velocity (Kolmogorov-Smirnov); where no impacts are known, of what
+    is sampled, the largest.
+    """
     distribution_sampling: float
+    """Likewise the largest among runs of the reference."""
 
 
 def statistics_of(
     found: Observation, reference: Observation, replicates: Sequence[Observation]
 ) -> Statistics | None:
-    """Compare a run of chaotic motion with the reference.
+    """Compare a run of chaotic motion with the reference; None where there are too few impacts.
 
-    Parameters
-    ----------
-    found, reference : Observation
-    replicates : sequence of Observation
-        Further runs of the reference, from slightly different numbers.
-
-    Returns
-    -------
-    Statistics or None
-        None where there are too few impacts.
+    Replicates are further runs of the reference, from slightly different numbers.
     """
     apart, told = (_off, _impacts) if len(reference.impacts) else (_off_samples, _samples)
     if min(told(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:

@@ -34,10 +34,7 @@ Place = tuple[int, ...]
 class SweepPlaces:
     """The points of a sweep at which a scene is looked at before it runs.
 
-    Parameters
-    ----------
-    scene : Scene
-        Which of its recordings is replayed makes no other point. Of adaptive axes there are their start values.
+    Which of its recordings is replayed makes no other point. Of adaptive axes there are their start values.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -79,12 +76,7 @@ class SweepPlaces:
         """Return the place halfway between two that are known where most may be missed; None where none is left.
 
         Between two neighbours (no other place is in the ball of which they span a diameter) that is taken to be the
-        larger of their errors times their distance.
-
-        Parameters
-        ----------
-        errors : mapping of Place to float
-            Of the places that are known; NaN where one says nothing.
+        larger of their errors times their distance. An error is NaN where a place says nothing.
         """
         known = np.array(list(errors))
         size = np.nan_to_num(np.array(list(errors.values())))
@@ -119,21 +111,14 @@ def _middle_of(members: Dimension) -> int:
 
 @dataclass(frozen=True, slots=True)
 class SweepModes:
-    """How many modes a sweep takes.
-
-    Attributes
-    ----------
-    convergence : Convergence
-        Its error is the largest of all points that were looked at.
-    points : int
-        How many were.
-    unmet : tuple of str
-        Points between the ends at which no number of modes meets the tolerance, by their values.
-    """
+    """How many modes a sweep takes."""
 
     convergence: Convergence
+    """Its error is the largest of all points that were looked at."""
     points: int
+    """How many were looked at."""
     unmet: tuple[str, ...]
+    """Points between the ends at which no number of modes meets the tolerance, by their values."""
 
 
 def modes_of_sweep(scene: Scene, tolerance: float, note: Note = lambda text: None) -> SweepModes:
@@ -141,20 +126,9 @@ def modes_of_sweep(scene: Scene, tolerance: float, note: Note = lambda text: Non
 
     The ends and the middle decide first. Further points are then run with the number found and with the most that it
     was compared with: all others where there are few, else 32 of a Sobol sequence and up to 32 between those where
-    errors are large. A point that differs by more than the tolerance decides from then on.
-
-    Parameters
-    ----------
-    scene : Scene
-        With `modes = "auto"`.
-    tolerance : float
-    note : callable
-        Told of each run that takes longer than a second.
-
-    Raises
-    ------
-    SceneError
-        No number of modes meets the tolerance at an end, or in the middle.
+    errors are large. A point that differs by more than the tolerance decides from then on. `note` is told of each run
+    that takes longer than a second. The scene has `modes = "auto"`. SceneError: no number of modes meets the tolerance
+    at an end, or in the middle.
     """
     search = _Search(SweepPlaces(scene), tolerance, note)
     for place in search.places.inner():

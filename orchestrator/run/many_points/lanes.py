@@ -20,19 +20,12 @@ DIRECTIONS = {"upper": 1.0, "lower": -1.0}
 
 @dataclass(frozen=True, slots=True)
 class LanePoints:
-    """Points as C takes them.
-
-    Attributes
-    ----------
-    plan : LanesPlan
-    modal : ModalPoints
-    given : dict of str to ndarray
-        The arrays of `LanesPoints.GIVEN` by name, without `first`.
-    """
+    """Points as C takes them."""
 
     plan: core.LanesPlan
     modal: ModalPoints
     given: dict[str, Floats]
+    """The arrays of `LanesPoints.GIVEN` by name, without `first`."""
 
 
 def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:

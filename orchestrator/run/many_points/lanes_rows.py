@@ -39,21 +39,14 @@ Alone = Callable[[int, State | None], RunRecord]
 
 @dataclass(frozen=True, slots=True)
 class LaneValues:
-    """Points as arrays, and where their branches begin.
-
-    Attributes
-    ----------
-    values : mapping of str to ndarray, shape (point,)
-        Of each swept key.
-    first : ndarray of bool, shape (point,)
-        Where a branch begins. The first point of all begins one too: what there is of its own.
-    starts : mapping of int to tuple of float
-        States of the points that begin a branch, but not as the scene says, by their place.
-    """
+    """Points as arrays, and where their branches begin."""
 
     values: Mapping[str, Floats]
+    """Of each swept key, shape (point,)."""
     first: NDArray[np.bool_]
+    """Where a branch begins, shape (point,). The first point of all begins one too: what there is of its own."""
     starts: Mapping[int, State]
+    """States of the points that begin a branch, but not as the scene says, by their place."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -78,26 +71,11 @@ class LaneValues:
 def run_in_lanes(
     loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    """Run points in lanes; along a branch each starts where the one before ended.
+    """Run points in lanes, and return the first of them that were run, with where the next point of the branch starts.
 
-    What a point returns does not depend on the points beside it.
-
-    Parameters
-    ----------
-    loop : PointLoop
-        Of the scene; it runs what the lanes leave.
-    points : LaneValues
-    deadline : float
-        No point begins after it, except the first, and none in a new branch; s of `time.perf_counter`.
-    alone : callable
-        Runs those that the scalar loop leaves out too.
-
-    Returns
-    -------
-    columns : RunColumns
-        Of the points that were run: the first of them.
-    carried : tuple of float or None
-        Where the next point of the branch starts.
+    Along a branch each starts where the one before ended. What a point returns does not depend on the points beside it.
+    After the deadline, s of `time.perf_counter`, no point begins except the first, and none in a new branch. `loop`
+    runs what the lanes leave, and `alone` what the loop leaves out too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
     if prepared is not None:

@@ -25,19 +25,9 @@ NO_IMPACTS: Floats = np.empty((0, 7))
 class MeasuringChain:
     """What a scene's sensor and load cell make of the motion of its body.
 
-    Parameters
-    ----------
-    scene : Scene
-        At a point of its sweep.
-    channels : sequence of str
-        Of `CHANNELS`; `drive` is a voltage that the caller knows.
-
-    Attributes
-    ----------
-    variables : tuple of str
-        Variables of the body's FMU that it takes, each once.
-    needs_impacts : bool
-        Whether the load cell is behind a rigid stop, so that the body has to record its impacts.
+    The scene is at a point of its sweep. The channels are of `CHANNELS`; `drive` is a voltage that the caller knows.
+    `variables` are those of the body's FMU that it takes, each once. `needs_impacts` says that the load cell is behind
+    a rigid stop, so that the body has to record its impacts.
     """
 
     def __init__(self, scene: Scene, channels: Sequence[str]) -> None:
@@ -76,16 +66,10 @@ class MeasuringChain:
         return self.volts(np.array([time]), values, NO_IMPACTS)
 
     def volts(self, times: Floats, values: Mapping[str, Floats], impacts: Floats) -> dict[str, Floats]:
-        """Return what the chain gives at instants, going on from those before; `drive` is not among it.
+        """Return what the chain gives at instants, going on from those before, by channel; `drive` is not among it.
 
-        Parameters
-        ----------
-        times : ndarray, shape (instant,)
-            s, ascending.
-        values : mapping of str to ndarray, shape (instant,)
-            Of each of the variables, SI; `acceleration` absolute.
-        impacts : ndarray, shape (impact, 7)
-            Those since the last of the instants before, columns `IMPACT_COLUMNS`.
+        The times ascend, s. Values are those of each of the variables, SI, shape (instant,); `acceleration` is
+        absolute. Impacts are those since the last of the instants before, shape (impact, 7), columns `IMPACT_COLUMNS`.
         """
         sensor, found = self._scene.sensor, {}
         for name, variable in self._readings.items():

@@ -23,18 +23,10 @@ Floats = NDArray[np.float64]
 
 
 def run_seed(seed: int, values: Mapping[str, float], direction: Direction) -> int:
-    """Return the seed of the noise of a run, 0 to 2^64 - 1: that of the scene where it sweeps nothing.
+    """Return the seed of the noise of a run, 0 to 2^64 - 1: `noise.seed` where the scene sweeps nothing.
 
-    It is made of the point and not of its number, which another sweep of the same campaign changes.
-
-    Parameters
-    ----------
-    seed : int
-        `noise.seed`.
-    values : mapping of str to float
-        Values of the swept keys.
-    direction : Direction
-        In which the branch of the point goes.
+    It is made of the point and not of its number, which another sweep of the same campaign changes. A point is the
+    values of the swept keys and the direction of its branch.
 
     Examples
     --------
@@ -51,18 +43,9 @@ def run_seed(seed: int, values: Mapping[str, float], direction: Direction) -> in
 
 
 def converted(scene: Scene, analog: Floats, names: Sequence[str], seed: int) -> Floats:
-    """Return samples with the noise of their channels, as the converter gives them.
+    """Return samples with the noise of their channels, as the converter gives them: the time, then each of the names.
 
-    Parameters
-    ----------
-    scene : Scene
-        At its point.
-    analog : ndarray, shape (sample, 1 + variable)
-        Time and variables.
-    names : sequence of str
-        Of the variables.
-    seed : int
-        See `run_seed`.
+    The scene is at its point, the samples have the shape (sample, 1 + variable), and the seed is that of `run_seed`.
     """
     # only a scene with such tables needs the core here
     from vibroimpact.fmus.core.measuring import digitised, gaussian

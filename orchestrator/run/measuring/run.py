@@ -32,20 +32,14 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """What is known at the instants of a block, the first of which is where the block before ended.
-
-    Attributes
-    ----------
-    times : ndarray, shape (instant,)
-        s.
-    rows : ndarray, shape (instant, variable)
-    volts : dict of str to ndarray, shape (instant,)
-        By channel.
-    """
+    """What is known at the instants of a block, the first of which is where the block before ended."""
 
     times: Floats
+    """s."""
     rows: Floats
+    """Shape (instant, variable)."""
     volts: Mapping[str, Floats]
+    """By channel, shape (instant,)."""
 
     def last(self) -> _Seen:
         """Return what is known at the last instant."""
@@ -56,17 +50,8 @@ class _Seen:
 class MeasuredRun:
     """The way of one run through its samples.
 
-    Parameters
-    ----------
-    scene : Scene
-        At its point.
-    driver : BodyDriver
-        Begun, at time 0.
-    plan : TimeSeriesPlan
-    parameters : mapping of str to float
-        Of the body.
-    window : tuple of float
-        Begin and end of the recording, s.
+    The scene is at its point, and the driver has begun at time 0. Parameters are those of the body; the window is begin
+    and end of the recording, s.
     """
 
     def __init__(
@@ -149,10 +134,7 @@ class MeasuredRun:
     def go(self, begin_recording: Callable[[], None]) -> None:
         """Go to the end of the recording; `begin_recording` is called where it begins.
 
-        Raises
-        ------
-        ImpactLimitReached, DeadlineReached
-            The run ends before; what was sampled is there.
+        ImpactLimitReached, DeadlineReached: the run ends before, and what was sampled is there.
         """
         seen = self._start()
         if self._first == 0:

@@ -13,16 +13,9 @@ MOST_PIECES = 5000
 
 
 def pieces_of(durations: Floats, finest: float, lead: float) -> Counts:
-    """Return into how many pieces steps are cut.
+    """Return into how many pieces steps of durations > 0, s, are cut, each no longer than `finest`, s; 0 cuts none.
 
-    Parameters
-    ----------
-    durations : ndarray, shape (step,)
-        s, > 0.
-    finest : float
-        Longest piece, s; 0: no step is cut.
-    lead : float
-        Time after which nothing is left of what was before, s: a longer step has one piece more, up to there.
+    After the time `lead`, s, nothing is left of what was before: a longer step has one piece more, up to there.
 
     Examples
     --------
@@ -39,23 +32,11 @@ def pieces_of(durations: Floats, finest: float, lead: float) -> Counts:
 def cut(
     times: Floats, volts: Floats, finest: float, lead: float
 ) -> tuple[Floats, Floats, NDArray[np.uint8], Counts]:
-    """Cut steps into pieces, see `pieces_of`.
+    """Cut steps into pieces, see `pieces_of`; return their ends and voltages, which begin a step, and each step's last.
 
-    Parameters
-    ----------
-    times : ndarray, shape (step + 1,)
-        Ends of the steps, s, ascending.
-    volts : ndarray, shape (step,)
-        Held over each.
-
-    Returns
-    -------
-    ends, held : ndarray, shape (piece,)
-        End and voltage of each piece.
-    renewed : ndarray of uint8, shape (piece,)
-        1 where a piece begins a step.
-    last : ndarray of int, shape (step,)
-        The last piece of each step, which ends exactly with it.
+    Times are the ends of steps, s, ascending, shape (step + 1,), and volts are held over each. Of the results, ends,
+    volts and `renewed` (1 where a piece begins a step) have the shape (piece,); the last piece of a step ends exactly
+    with it.
 
     Examples
     --------

@@ -18,24 +18,16 @@ BUSY = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What a study took of the machine.
-
-    Attributes
-    ----------
-    asked : float
-        Its budget: processor time, s.
-    processor : float
-        Processor time of all its processes, s.
-    wall : float
-        Wall time, s.
-    waited : float
-        Share of the wall time of the timed runs in which they waited for a processor.
-    """
+    """What a study took of the machine."""
 
     asked: float = math.nan
+    """Its budget: processor time, s."""
     processor: float = math.nan
+    """Processor time of all its processes, s."""
     wall: float = math.nan
+    """Wall time, s."""
     waited: float = 0.0
+    """Share of the wall time of the timed runs in which they waited for a processor."""
 
     @property
     def is_busy(self) -> bool:
@@ -63,13 +55,7 @@ class Effort:
 
 
 class Budget:
-    """What a study may spend, and has spent, from the moment it is made.
-
-    Parameters
-    ----------
-    seconds : float
-        Processor time of all processes, s.
-    """
+    """What a study may spend, and has spent, from the moment it is made: processor time of all processes, s."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds

@@ -57,14 +57,8 @@ def table_of(
 ) -> Table:
     """Return what was measured as a table.
 
-    Parameters
-    ----------
-    known : float
-        Error of the reference.
-    width : int
-        Of the terminal: a narrow one gets fewer columns, lest it cuts the names of the ways.
-    periods : float
-        Forcing periods of a run; NaN where nothing forces it.
+    `known` is the error of the reference. `width` is that of the terminal: a narrow one gets fewer columns, lest it
+    cuts the names of the ways. `periods` are the forcing periods of a run; NaN where nothing forces it.
     """
     scored = any(one.variance == one.variance for one in measured)
     wide, of_periods = width >= WIDE, periods == periods
@@ -131,13 +125,7 @@ def print_comparison(compared: Comparison) -> None:
 
 
 def write_tuned(text: str, compared: Comparison, target: Path) -> None:
-    """Write a scene with the settings of the way that was chosen.
-
-    Raises
-    ------
-    UsageError
-        A scene cannot ask for this way.
-    """
+    """Write a scene with the settings of the way that was chosen; UsageError where a scene cannot ask for it."""
     chosen = compared.chosen
     assert chosen is not None  # else refused
     known = error_of_reference(compared.reference, compared.quantity)

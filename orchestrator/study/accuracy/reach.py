@@ -35,24 +35,16 @@ MOST_HALVINGS = 40
 
 @dataclass(frozen=True, slots=True)
 class Passed:
-    """A scene whose transient was passed once.
-
-    Attributes
-    ----------
-    scene : Scene
-        Starts with the state at the end of the transient; the scene itself where there is none to be passed so.
-    whole : Scene
-        Starts where the scene does.
-    observation : Observation or None
-        What a fused run of `whole` has shown; None where none was needed.
-    remark : str
-        Why each way passes the transient itself; empty where none does.
-    """
+    """A scene whose transient was passed once."""
 
     scene: Scene
+    """Starts with the state at the end of the transient; the scene itself where there is none to be passed so."""
     whole: Scene
+    """Starts where the scene does."""
     observation: Observation | None = None
+    """What a fused run of `whole` has shown; None where none was needed."""
     remark: str = ""
+    """Why each way passes the transient itself; empty where none does."""
 
     @property
     def is_kept(self) -> bool:
@@ -63,16 +55,7 @@ class Passed:
 def within_reach(scene: Scene, budget: Budget) -> Scene:
     """Return a scene that records as long as a run of it takes a small part of a budget: all, a half, a quarter, ...
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    budget : Budget
-
-    Raises
-    ------
-    UsageError
-        One forcing period takes too much; with the least budget.
+    The scene has no sweep. UsageError: one forcing period takes too much; it says the least budget.
     """
     share = RECORDING_SHARE if scene.is_one_body else GENERAL_SHARE
     for _ in range(MOST_HALVINGS):
@@ -92,16 +75,7 @@ def within_reach(scene: Scene, budget: Budget) -> Scene:
 def transient_passed(scene: Scene, budget: Budget) -> Passed:
     """Pass the transient of a scene of the short form by the fused way, and keep the state at its end as a start.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    budget : Budget
-
-    Raises
-    ------
-    UsageError
-        The transient takes too much of the budget; with the least budget.
+    The scene has no sweep. UsageError: the transient takes too much of the budget; it says the least budget.
     """
     if not scene.is_lone_body or not _has_transient(scene):
         return Passed(scene, scene)

@@ -241,12 +241,8 @@ def studied_scene(scene: Scene) -> Scene:
     """Return a scene as it is studied: one point, impacts and extremes recorded.
 
     A time series is left out where impacts tell more, since it costs more than the motion; a general scene and a free
-    motion have nothing else to be compared by. A measuring chain is left out: no other way has one.
-
-    Raises
-    ------
-    UsageError
-        The scene has an exciter whose force is not its forcing alone.
+    motion have nothing else to be compared by. A measuring chain is left out: no other way has one. UsageError: the
+    scene has an exciter whose force is not its forcing alone.
     """
     alone = scene.unswept()
     if not scene.is_lone_body:

@@ -31,12 +31,7 @@ LEAST_PART = 2.0**-30
 class References:
     """What each way is compared with over each part of the time; each of these runs once.
 
-    Parameters
-    ----------
-    reference : Reference
-        Of the studied scene, over all of its time.
-    passed : Passed
-        How its transient was passed.
+    `reference` is that of the studied scene over all of its time; `passed` says how its transient was passed.
     """
 
     def __init__(self, reference: Reference, passed: Passed) -> None:
@@ -84,18 +79,7 @@ class References:
 def tried(way: Way, references: References, most: float) -> tuple[Measured, Trial | None]:
     """Run a way, and compare what it shows; over half of the time, a quarter, ... until it ends.
 
-    Parameters
-    ----------
-    way : Way
-    references : References
-    most : float
-        Processor time after which a run is given up, s.
-
-    Returns
-    -------
-    one : Measured
-    trial : Trial or None
-        None where the way failed.
+    `most` is the processor time after which a run is given up, s. The trial is None where the way failed.
     """
     part = 1.0
     while True:

@@ -16,20 +16,9 @@ _NEXT_HEADER = re.compile(r"^[ \t]*\[", re.MULTILINE)
 
 
 def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
-    """Return the text of a scene with other keys in `[execution]`, and why as a comment above them.
+    """Return a scene's TOML with other keys in `[execution]`, given without its name, and why as a comment above them.
 
-    Parameters
-    ----------
-    text : str
-        TOML.
-    settings : mapping of str to Any
-        Keys of `[execution]`, without its name.
-    reason : str
-
-    Returns
-    -------
-    str
-        Where the table is written in a way that lines cannot be put into, all of the text is written anew.
+    Where the table is written in a way that lines cannot be put into, all of the text is written anew.
 
     Examples
     --------

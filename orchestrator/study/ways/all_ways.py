@@ -44,18 +44,11 @@ SAMPLING = (1.0 / 16.0, 0.25, 1.0, 4.0, 16.0)
 def ways_of(
     scene: Scene, *, speed: float = math.nan, rate: float = math.nan, whole: Scene | None = None
 ) -> list[Way]:
-    """Return the ways in which a scene can be simulated, and their settings.
+    """Return the ways in which a scene without a sweep can be simulated, and their settings.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    speed : float
-        Of its impacts, typically, m/s: other laws that depend on it are made alike there.
-    rate : float
-        Samples per s of the time series that it asks for; NaN for none.
-    whole : Scene, optional
-        The scene with its transient, where `scene` begins after it: other models pass one of their own.
+    Other laws that depend on the speed are made alike at that of its impacts, typically, m/s. The rate is that of the
+    time series that it asks for, samples per s; NaN for none. `whole` is the scene with its transient, where `scene`
+    begins after it: other models pass one of their own.
     """
     if not scene.is_one_body:
         return _general_ways(scene)

@@ -22,11 +22,8 @@ from vibroimpact.orchestrator.study.ways.span import window_of
 class DrivenTrial:
     """A body and its stops, fused or coupled as the scene says, over the first part of its time.
 
-    Attributes
-    ----------
-    start : tuple of float
-        State where the recording of the last run began: displacements (m), then velocities (m/s), of the oscillator,
-        the masses or the modes. Empty before a run has come to it.
+    `start` is the state where the recording of the last run began: displacements (m), then velocities (m/s), of the
+    oscillator, the masses or the modes. It is empty before a run has come to it.
     """
 
     is_guarded = False

@@ -27,13 +27,7 @@ POWER_LAW_TIME = 3.218065
 def restitution_at(stop: Stop, mass: float, speed: float) -> float:
     """Return the coefficient of restitution that a stop gives a rigid mass; NaN for a law that none is known of.
 
-    Parameters
-    ----------
-    stop : Stop
-    mass : float
-        kg.
-    speed : float
-        Of the mass when it touches the stop, m/s.
+    The mass, kg, touches the stop with the speed, m/s.
     """
     return _RESTITUTIONS[stop.law](stop, mass, speed)
 
@@ -57,16 +51,9 @@ def laws_of_equal_restitution(
 ) -> dict[str, dict[str, Any]]:
     """Return the laws that yield, by their names in words, with the numbers that a `[[stop]]` has for them.
 
-    Parameters
-    ----------
-    restitution : float
-        `LEAST_RESTITUTION` to 1.
-    mass : float
-        kg.
-    speed : float
-        At which a Hunt-Crossley stop, whose restitution falls with it, has that one, m/s.
-    duration : float
-        Of a contact, s; of a power law that of the same stop without damping.
+    The restitution is `LEAST_RESTITUTION` to 1, of a mass in kg. At the speed, m/s, a Hunt-Crossley stop has it, whose
+    restitution falls with that. The duration is that of a contact, s; of a power law that of the same stop without
+    damping.
     """
     ratio = damping_ratio_of(restitution)
     rate = _angle(ratio) / duration
@@ -114,10 +101,7 @@ def _power_law_time(exponent: float, stiffness: float, mass: float, speed: float
 def restitution_of(ratio: float) -> float:
     """Return the coefficient of restitution of a rigid mass on a Kelvin-Voigt stop that never pulls.
 
-    Parameters
-    ----------
-    ratio : float
-        Damping ratio of the mass on the stop, >= 0 (equations.md 6.9).
+    The ratio is the damping ratio of the mass on the stop, >= 0 (equations.md 6.9).
 
     Examples
     --------
@@ -142,10 +126,7 @@ def damping_ratio_of(restitution: float) -> float:
 def restitution_of_product(product: float) -> float:
     """Return the coefficient of restitution of a Hunt-Crossley stop: p (1 + e) = ln((1 + p) / (1 - p e)).
 
-    Parameters
-    ----------
-    product : float
-        p, its damping times the speed (equations.md 6.10).
+    The product p is that of its damping and the speed (equations.md 6.10).
 
     Examples
     --------

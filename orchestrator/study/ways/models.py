@@ -28,14 +28,9 @@ MODES_TRIED = (1, 2, 4, 8, 16, 32, MOST_MODES)
 
 
 def other_models(scene: Scene, speed: float) -> list[Way]:
-    """Return other models of a scene of the short form.
+    """Return other models of a scene of the short form without a sweep.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    speed : float
-        Of its impacts, typically, m/s; NaN where there are none.
+    The speed is that of its impacts, typically, m/s; NaN where there are none.
     """
     body, ways = scene.body, []
     if scene.stops:
@@ -96,12 +91,7 @@ def _fewer_modes(scene: Scene) -> list[Way]:
 
 
 def told_by(ways: Sequence[Way]) -> str:
-    """Return in words what other numbers of modes are compared with; empty where there are none.
-
-    Parameters
-    ----------
-    ways : sequence of Way
-    """
+    """Return in words what other numbers of modes are compared with; empty where there are none."""
     finest = next((way.against.body for way in ways if way.against is not None), None)
     if finest is None:
         return ""

@@ -32,12 +32,7 @@ LEAST_SAMPLES = 64
 class ReplayTrial:
     """A replay of the first recording that a scene names, with one of `every` samples of each channel.
 
-    Raises
-    ------
-    UsageError
-        The scene names no recording.
-    DatasetError
-        The recording cannot be read.
+    UsageError: the scene names no recording. DatasetError: it cannot be read.
     """
 
     is_guarded = False
@@ -109,12 +104,8 @@ def _thinned_axis(axis: TimeAxis, every: int) -> TimeAxis:
 def rates_of(scene: Scene) -> dict[int, float]:
     """Return how far the recording of a scene can be thinned, with the rate that is left, 1/s.
 
-    It is that of the channel that drives, or of the first that is compared.
-
-    Raises
-    ------
-    DatasetError
-        The recording cannot be read, or has no such channel.
+    It is that of the channel that drives, or of the first that is compared. DatasetError: the recording cannot be read,
+    or has no such channel.
     """
     replay = scene.replay
     assert replay is not None

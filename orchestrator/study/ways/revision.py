@@ -40,7 +40,6 @@ class RevisedTrial:
         part: float = 1.0,
     ) -> None:
         floats, integers = float_parameters(scene, None), integer_parameters(scene)
-        self._scene = scene
         self._window = window_of(scene, floats, part)
         count = len(scene.stops)
         stranger = stranger_of(scene)

@@ -13,29 +13,17 @@ from vibroimpact.orchestrator.study.ways.replays import first_part_of_replay
 def window_of(scene: Scene, floats: Mapping[str, float], part: float) -> tuple[float, float]:
     """Return start and end of the recording of the first part of a scene of the short form, s.
 
-    Both come earlier: the part is one of all that is simulated.
-
-    Parameters
-    ----------
-    scene : Scene
-    floats : mapping of str to float
-        Real parameters of its body.
-    part : float
-        0 < part <= 1.
+    Both come earlier: the part, 0 < part <= 1, is one of all that is simulated. `floats` are the real parameters of its
+    body.
     """
     begin, end = recorded_window(scene, floats)
     return part * begin, part * end
 
 
 def first_part(scene: Scene, part: float) -> Scene:
-    """Return a general scene, or a replay, that ends after the first part of its time.
+    """Return a general scene or a replay that ends after the first part of its time, 0 < part <= 1.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    part : float
-        0 < part <= 1.
+    The scene has no sweep.
     """
     if part == 1.0:
         return scene

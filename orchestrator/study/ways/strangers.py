@@ -12,23 +12,18 @@ from vibroimpact.orchestrator.study.observation import Floats
 
 @dataclass(frozen=True, slots=True)
 class Stranger:
-    """The parameters of a body without stops, and the names of its variables at each of them.
-
-    Attributes
-    ----------
-    floats, integers : dict
-        Parameters, by variable name, SI.
-    displacements, velocities : tuple of str
-        Motion of the point in front of each stop.
-    forces : tuple of str
-        Input that acts there; empty where the body has none at a stop.
-    """
+    """The parameters of a body without stops, and the names of its variables at each of them."""
 
     floats: dict[str, float]
+    """Parameters, by variable name, SI."""
     integers: dict[str, int]
+    """Likewise."""
     displacements: tuple[str, ...]
+    """Displacement of the point in front of each stop."""
     velocities: tuple[str, ...]
+    """And its velocity."""
     forces: tuple[str, ...]
+    """Input that acts there; empty where the body has none at a stop."""
 
 
 def stranger_of(scene: Scene) -> Stranger:
@@ -43,10 +38,7 @@ def stranger_of(scene: Scene) -> Stranger:
 def thrown_back(scene: Scene) -> tuple[tuple[str, ...], Floats]:
     """Return the start velocities of a body, and their changes by an impulse at each rigid stop, for 1 m/s there.
 
-    Returns
-    -------
-    names : tuple of str
-    changes : ndarray, shape (stop, N)
+    They are the names of the velocities, N of them, and the changes, shape (stop, N).
     """
     body, rigid = body_points(scene), [LAWS[stop.law].is_rigid for stop in scene.stops]
     shapes = body.contact_shapes()[rigid]

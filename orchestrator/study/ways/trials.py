@@ -43,7 +43,6 @@ class CoupledTrial:
     """The body and its stops, each an FMU of one version of FMI, `3.0` or `2.0`."""
 
     def __init__(self, scene: Scene, version: str, wrap: Wrapper | None = None, part: float = 1.0) -> None:
-        self._scene = scene
         self._floats, integers = float_parameters(scene, None), integer_parameters(scene)
         self._window = window_of(scene, self._floats, part)
         stops = len(scene.stops)

@@ -39,36 +39,24 @@ class Opener(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A way of simulating a scene at one setting.
-
-    Attributes
-    ----------
-    name : str
-        What differs in kind: `fused`, `coupled, FMI 2.0`, `model exchange, CVode`, ...
-    knob : str
-        The key, or the number, that is set; empty where there is nothing to set.
-    setting : float
-        Its value; NaN without a knob.
-    changes : mapping of str to Any
-        Keys of the scene, with the values that make it run this way; empty where no scene says it.
-    open : callable
-        Opens the way; given a wrapper of the functions of all FMUs, or None, and the part of the time to simulate.
-    model : bool
-        Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise.
-    against : Scene or None
-        The finest model of its kind, where its errors are told by that one and not by the study's reference.
-    scene : Scene or None
-        What is simulated, where its own runner does it.
-    """
+    """A way of simulating a scene at one setting."""
 
     name: str
+    """What differs in kind: `fused`, `coupled, FMI 2.0`, `model exchange, CVode`, ..."""
     knob: str
+    """The key, or the number, that is set; empty where there is nothing to set."""
     setting: float
+    """Its value; NaN without a knob."""
     changes: Mapping[str, Any]
+    """Keys of the scene, with the values that make it run this way; empty where no scene says it."""
     open: Opener
+    """Opens the way; given a wrapper of the functions of all FMUs, or None, and the part of the time to simulate."""
     model: bool = False
+    """Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise."""
     against: Scene | None = None
+    """The finest model of its kind, where its errors are told by that one and not by the study's reference."""
     scene: Scene | None = None
+    """What is simulated, where its own runner does it."""
 
     @property
     def label(self) -> str:
