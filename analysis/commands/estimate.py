@@ -166,7 +166,7 @@ def _write(console: Terminal, dataset: xr.Dataset, options: Estimation) -> None:
     dataset = dataset.assign_attrs(spelled(dataset.attrs, console.spelling))
     if options.output is not None:
         with writing(options.output):
-            write_results(dataset, options.output, kind="estimates")
+            write_results(dataset, options.output)
         console.print(f"Estimates written to {options.output}.")
     if options.figure is not None:
         with writing(options.figure):

@@ -58,7 +58,8 @@ class ResultTable:
         Of the results, by which `vi.draw` knows how to draw them.
     *rows : tuple of str
         Name, dimensions with blanks between them, SI unit, name in words. `text` after these: values are texts. A name
-        that ends in `#` is that of several variables, each with its number; `{WORD}` in words is said with the values.
+        that ends in `#` is that of several variables, each with its number; `{WORD}` in a unit or in words is said with
+        the values.
 
     Examples
     --------
@@ -96,7 +97,7 @@ class ResultTable:
         units : {"SI", "nondimensional"}
             In the latter no variable has a unit.
         **said
-            What stands in the words of variables.
+            What stands in the units and words of variables.
 
         Raises
         ------
@@ -109,7 +110,8 @@ class ResultTable:
             dims = tuple(dim for each in rule.dims for dim in (over if each == SWEPT else (each,)))
             of_one = isinstance(values[name], str)  # numpy keeps a single text as it is
             array = np.asarray(values[name], dtype=None if of_one else rule.dtype)
-            rows[name] = dims, array, _unit_in(units, rule.unit), rule.long_name.format(**said)
+            unit = _unit_in(units, rule.unit).format(**said)
+            rows[name] = dims, array, unit, rule.long_name.format(**said)
         found = xr.Dataset(described(rows), coords, dict(attrs or {}))
         return found.assign_attrs(results_kind=self.kind)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from vibroimpact.analysis.files.estimate_table import estimate_table
+from vibroimpact.analysis.dataset.estimate_table import estimate_table
 from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.messages import message
 from vibroimpact.fmus.printing import table, value_and_error

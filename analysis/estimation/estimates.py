@@ -10,13 +10,28 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+from vibroimpact.analysis.dataset.estimate_table import estimate_table
+from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.estimation.physics import Floats
-from vibroimpact.analysis.files.estimate_table import described, estimate_table
 from vibroimpact.fmus.messages import joined, message
 from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
+TABLE = ResultTable(
+    "estimates",
+    ("impact_time", "impact", "s", "instants of impact"),
+    ("time", "time", "s", "time"),
+    ("measured", "time", "{unit}", "measured displacement"),
+    ("fitted", "time", "{unit}", "displacement fitted by {method}"),
+    ("bounce_speed", "bounce", "{speed}", "speed of approach"),
+    ("bounce_ratio", "bounce", "1", "ratio of the flights after and before"),
+    ("restitution_of_speed", "bounce", "1", "restitution at the speed of the impact"),
+    *(
+        (f"restitution_of_speed_{end}", "bounce", "1", f"restitution at the speed of the impact, {words}")
+        for end, words in (("low", "lower end of the interval"), ("high", "upper end of the interval"))
+    ),
+)
 METHODS = (
     "energy_known_damping",
     "energy_joint",
@@ -230,42 +245,21 @@ class ImpactEstimates:
             method: {name: astuple(one) for name, one in self.values[method].items()} for method in methods
         }
         units = {name: self.unit_of(name) for name in quantities}
-        instants = ("impact", self.impact_times, described("instants of impact", "s"))
-        found = estimate_table(cells, units, self.confidence).assign_coords(impact_time=instants)
-        motion = self.motion
-        if motion is not None:
-            fitted = described(f"displacement fitted by {motion.method}", self.unit)
-            found = found.assign(
-                measured=("time", motion.measured, described("measured displacement", self.unit)),
-                fitted=("time", motion.fitted, fitted),
-            ).assign_coords(time=("time", motion.time, described("time", "s")))
-        if self.of_speed is not None:
-            found = found.assign(self._of_speed())
-        return found.assign_attrs(self._attributes())
+        parts = [estimate_table(cells, units, self.confidence), self._motion()]
+        return xr.merge(parts, combine_attrs="override").assign_attrs(self._attributes())
 
-    def _of_speed(self) -> dict[str, tuple[str, Floats, dict[str, str]]]:
-        """Return r(v) as variables over the impacts between two flights."""
-        found, words = self.of_speed, "restitution at the speed of the impact"
-        assert found is not None
-        return {
-            "bounce_speed": (
-                "bounce",
-                found.speed,
-                described("speed of approach", self.unit_of("impact_velocity")),
-            ),
-            "bounce_ratio": ("bounce", found.single, described("ratio of the flights after and before")),
-            "restitution_of_speed": ("bounce", found.fitted, described(words)),
-            "restitution_of_speed_low": (
-                "bounce",
-                found.low,
-                described(f"{words}, lower end of the interval"),
-            ),
-            "restitution_of_speed_high": (
-                "bounce",
-                found.high,
-                described(f"{words}, upper end of the interval"),
-            ),
-        }
+    def _motion(self) -> xr.Dataset:
+        """Return impacts, the fitted motion, and r(v) over the impacts between two flights, where there are such."""
+        motion, found = self.motion, self.of_speed
+        values = {"impact_time": self.impact_times}
+        if motion is not None:
+            values |= {"measured": motion.measured, "fitted": motion.fitted, "time": motion.time}
+        if found is not None:
+            values |= {"bounce_speed": found.speed, "bounce_ratio": found.single}
+            values |= {"restitution_of_speed": found.fitted}
+            values |= {"restitution_of_speed_low": found.low, "restitution_of_speed_high": found.high}
+        speed, method = self.unit_of("impact_velocity"), "" if motion is None else motion.method
+        return TABLE.dataset(values, unit=self.unit, speed=speed, method=method).set_coords("impact_time")
 
     def _attributes(self) -> dict[str, str | float]:
         """Return what belongs to the whole table."""

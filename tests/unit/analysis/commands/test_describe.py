@@ -13,8 +13,8 @@ from support.replay_signals import HIT, clock, ring
 from support.replay_signals import channel as replay_channel
 
 from vibroimpact.analysis.dataset import write_dataset
+from vibroimpact.analysis.dataset.estimate_table import estimate_table
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.analysis.files.estimate_table import estimate_table
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.analysis.spikes import spike_report
@@ -56,7 +56,7 @@ def test_estimates_are_told_with_their_standard_errors_and_units(tmp_path: Path)
         noise_error=((), 0.02, {"units": "N", "long_name": "its error"})
     )
     found = found.assign_attrs(estimates="impacts", source_file="rig.nc", remarks="the signal is short.")
-    write_results(found, tmp_path / "found.nc", kind="estimates")
+    write_results(found, tmp_path / "found.nc")
     lines = described(tmp_path / "found.nc")
     assert lines[0].endswith("found.nc: estimates of impacts")
     assert "made by: vibroimpact estimate impacts of rig.nc" in lines

@@ -168,7 +168,7 @@ def test_table_and_dataset_have_every_method_side_by_side(tmp_path):
     row = dataset.sel(estimator="trajectory", quantity="restitution")
     assert float(row.interval_low) < float(row.estimate) < float(row.interval_high)
     assert "conditioning_joint_restitution_per_relative_velocity" in dataset.attrs
-    write_results(dataset, tmp_path / "estimates.nc", kind="estimates")
+    write_results(dataset, tmp_path / "estimates.nc")
     out = io.StringIO()
     print_impacts(Console(file=out, width=200), found)
     text = out.getvalue()

@@ -7,8 +7,21 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.results import ResultTable
+
+TABLE = ResultTable(
+    "estimates",
+    ("estimate", "estimator quantity", "1", "estimate, in the unit of its quantity"),
+    ("standard_error", "estimator quantity", "1", "standard error of the estimate"),
+    ("interval_low", "estimator quantity", "1", "lower end of the {confidence} interval"),
+    ("interval_high", "estimator quantity", "1", "upper end of the {confidence} interval"),
+    ("estimator", "estimator", "1", "method of estimation"),
+    ("quantity", "quantity", "1", "estimated quantity"),
+    ("unit", "quantity", "1", "unit of the quantity"),
+)
 Cell = tuple[float, float, float, float]
 """Value, standard error, and both ends of the interval."""
+_OF_A_CELL = ("estimate", "standard_error", "interval_low", "interval_high")
 _NOTHING: Cell = (float("nan"),) * 4
 
 
@@ -36,24 +49,6 @@ def estimate_table(
     """
     rows = [[found.get(quantity, _NOTHING) for quantity in units] for found in cells.values()]
     values = np.array(rows, dtype=np.float64).reshape(len(cells), len(units), len(_NOTHING))
-    words = {
-        "estimate": "estimate, in the unit of its quantity",
-        "standard_error": "standard error of the estimate",
-        "interval_low": f"lower end of the {confidence:.0%} interval",
-        "interval_high": f"upper end of the {confidence:.0%} interval",
-    }
-    data = {
-        name: (("estimator", "quantity"), values[:, :, place], described(said))
-        for place, (name, said) in enumerate(words.items())
-    }
-    coords = {
-        "estimator": ("estimator", list(cells), described("method of estimation")),
-        "quantity": ("quantity", list(units), described("estimated quantity")),
-        "unit": ("quantity", list(units.values()), described("unit of the quantity")),
-    }
-    return xr.Dataset(data, coords)
-
-
-def described(words: str, unit: str = "1") -> dict[str, str]:
-    """Return the attributes of a variable: its unit, and what it is in words."""
-    return {"units": unit, "long_name": words}
+    found = dict(zip(_OF_A_CELL, np.moveaxis(values, -1, 0), strict=True))
+    axes = {"estimator": list(cells), "quantity": list(units), "unit": list(units.values())}
+    return TABLE.dataset(found | axes, confidence=f"{confidence:.0%}").set_coords("unit")
