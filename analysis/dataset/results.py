@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
+from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.dataset.schema import CONVENTIONS, UnitSystem, VariableRule
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
@@ -142,7 +143,8 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
     Parameters
     ----------
     dataset : xarray.Dataset
-        Every variable with `units` and `long_name`; any dimensions.
+        Every variable with `units` and `long_name`; any dimensions. Versions and commit of the program are added where
+        it has none.
     path : path
         An older file of this name is replaced only when the new one is complete.
     kind : str
@@ -168,7 +170,7 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
     if problems:
         raise DatasetError("\n".join(problems))
     identity = {"Conventions": CONVENTIONS, "results_schema": RESULTS_SCHEMA, "results_kind": kind}
-    described = dataset.assign_attrs(dataset.attrs | identity)
+    described = dataset.assign_attrs(program_attributes() | dataset.attrs | identity)
     encoding: dict[Any, dict[str, Any]] = {
         name: {"_FillValue": np.nan if name not in dataset.coords else None}
         for name, variable in dataset.variables.items()
