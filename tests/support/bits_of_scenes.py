@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 import xarray as xr
 
 import vibroimpact as vi
@@ -211,9 +212,9 @@ def digest(dataset: xr.Dataset) -> str:
 
 
 def fingerprint() -> str:
-    """Return the compiler of the C core and the bits of this machine's sines, powers and linear algebra.
+    """Return the compiler of the C core, numpy, scipy, and the bits of this machine's sines, powers and linear algebra.
 
-    All of them differ between machines, and the last bits of motions with them.
+    All of them differ between machines, and the last bits of motions or of what replays compare with them.
     """
     x = np.linspace(0.1, 20.0, 4001)
     parts = [np.sin(x), np.cos(x), np.exp(-x), np.log(x), np.sqrt(x), x**0.3, np.sinh(x), np.arctan2(x, 2.0)]
@@ -221,7 +222,10 @@ def fingerprint() -> str:
     parts += [np.linalg.eigh(matrix + matrix.T)[0], np.linalg.solve(matrix, x[:12])]
     library = next((package_folder() / "built").glob("*vibroimpact_core*")).read_bytes()
     compilers = sorted(set(re.findall(rb"(?:GCC: \(|clang version )[^\0]+", library)))
-    return hashlib.sha256(b"".join([*compilers, *(part.tobytes() for part in parts)])).hexdigest()[:16]
+    libraries = f"{np.__version__} {scipy.__version__}".encode()
+    return hashlib.sha256(b"".join([*compilers, libraries, *(part.tobytes() for part in parts)])).hexdigest()[
+        :16
+    ]
 
 
 def kept() -> Mapping[str, str]:

@@ -14,6 +14,9 @@ from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import Store
 from vibroimpact.service.supervisor import Supervisor
 
+PHRASES = {"Content Too Large": "Request Entity Too Large", "Unprocessable Content": "Unprocessable Entity"}
+"""What Python 3.13 calls a status, and what it was called before."""
+
 
 def openapi() -> str:
     """Return the document in a fixed order, without the version of the package."""
@@ -24,4 +27,7 @@ def openapi() -> str:
         document = application(store, Supervisor(store), shelf, Sessions("token")).openapi()
         store.close()
     del document["info"]["version"]
-    return json.dumps(document, indent=1, sort_keys=True) + "\n"
+    written = json.dumps(document, indent=1, sort_keys=True) + "\n"
+    for new, old in PHRASES.items():
+        written = written.replace(f'"{new}"', f'"{old}"')
+    return written
