@@ -14,7 +14,11 @@ from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import Store
 from vibroimpact.service.supervisor import Supervisor
 
-PHRASES = {"Content Too Large": "Request Entity Too Large", "Unprocessable Content": "Unprocessable Entity"}
+PHRASES = {
+    "Content Too Large": "Request Entity Too Large",
+    "Range Not Satisfiable": "Requested Range Not Satisfiable",
+    "Unprocessable Content": "Unprocessable Entity",
+}
 """What Python 3.13 calls a status, and what it was called before."""
 
 
