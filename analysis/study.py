@@ -7,6 +7,7 @@ what they are as a dataset, in print and as a figure. `whole` makes one for a ca
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
@@ -32,7 +33,7 @@ def _nowhere(_: Any) -> None:
 
 
 @dataclass(eq=False)
-class Study(Generic[Row]):
+class Study(ABC, Generic[Row]):
     """A study; a subclass is a dataclass whose fields are what it is of.
 
     A subclass implements `rows` and `made`, for the command line `prepare` and `print_results` as well.
@@ -51,7 +52,7 @@ class Study(Generic[Row]):
 
     name: ClassVar[str]
     nothing: ClassVar[str] = "a result"
-    """What there is none of before the first row."""
+    """Noun of what there is none of before the first row."""
     begins: ClassVar[str] = ""
     """First words of the status line; none: there is no such line."""
     named: ClassVar[tuple[type[VibroimpactError], ...]] = ()
@@ -69,6 +70,7 @@ class Study(Generic[Row]):
     status: Callable[[str], None] = field(default_factory=lambda: _nowhere, init=False)
 
     @classmethod
+    @abstractmethod
     def prepare(cls, options: Any, stack: ExitStack) -> Self | None:
         """Return the study that the arguments of its operation ask for; None where they ask for no study.
 
@@ -78,7 +80,6 @@ class Study(Generic[Row]):
         stack : ExitStack
             Closes at the end what the study opens.
         """
-        raise NotImplementedError
 
     @classmethod
     def reads(cls, options: Any) -> Sequence[Path]:
@@ -97,13 +98,13 @@ class Study(Generic[Row]):
             return {"history": cls.history}
         return {"results_kind": cls.name.replace("-", "_"), **cls.marks(options)}
 
+    @abstractmethod
     def rows(self) -> Generator[Row, None, None]:
         """Find the rows, one after the other; what makes none of them is refused before the first."""
-        raise NotImplementedError
 
+    @abstractmethod
     def made(self) -> xr.Dataset:
         """Return the dataset of what was found so far."""
-        raise NotImplementedError
 
     @cached_property
     def dataset(self) -> xr.Dataset:
@@ -123,9 +124,9 @@ class Study(Generic[Row]):
         """Return what shows, while it is open, how far the study is."""
         return Terminal(stderr=True).status(self.begins) if self.begins else nullcontext()
 
+    @abstractmethod
     def print_results(self) -> None:
         """Print what was found."""
-        raise NotImplementedError
 
     @property
     def written(self) -> xr.Dataset | None:

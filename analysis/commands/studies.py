@@ -26,7 +26,7 @@ class Interrupted(VibroimpactError):
 
 
 class Studied(Places, Protocol):
-    """What operations that are studies declare: the study, and where its results go."""
+    """Arguments of operations that are studies: the study, and where its results go."""
 
     @property
     def study(self) -> str:

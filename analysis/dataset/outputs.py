@@ -133,7 +133,7 @@ def refuse_overwriting(
 
 
 class Places(Protocol):
-    """What operations with results declare: dataset, figure, and whether other files may be replaced."""
+    """Arguments of operations with results: dataset, figure, and whether other files may be replaced."""
 
     @property
     def output(self) -> Path | None:

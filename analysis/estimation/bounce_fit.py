@@ -48,7 +48,7 @@ class BounceFit:
     acceleration: float
     """`stop` and `acceleration`: coordinate of an upper stop, unit of the displacement (per s^2)."""
     covariance: Floats
-    """Of stop, acceleration, instants, per variance of the noise; shape (2 + instant, 2 + instant)."""
+    """Covariance of stop, acceleration, instants, per variance of the noise; shape (2 + instant, 2 + instant)."""
     square: float
     """Sum of squared residuals."""
     fitted: Floats

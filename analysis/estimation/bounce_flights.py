@@ -39,11 +39,11 @@ class BounceFlights:
     lengths: Floats
     """s, shape (flight,)."""
     covariance: Floats
-    """Of the logarithms of the lengths: neighbours share the error of an instant."""
+    """Covariance of the logarithms of the lengths: neighbours share the error of an instant."""
     acceleration: float
     """Towards the stop, unit of the channel per s^2; 0 where no flight shows it."""
     impact_times: Floats
-    """Those that were seen, s, shape (impact,)."""
+    """Instants that were seen, s, shape (impact,)."""
     stop_position: float
     """As measured, unit of the channel."""
     stop_error: float

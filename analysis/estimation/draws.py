@@ -37,14 +37,14 @@ class Resampled:
     balance: EnergyBalance
     """With the window that suits the noise."""
     parameters: Parameters
-    """What the methods take as known."""
+    """Numbers that the methods take as known."""
     measured: HalfEnergies
     exact: HalfEnergies
     drawn: HalfEnergies
     varied: Drawn
     """Parameters from the weak form, shape (draw,), which vary with the noise of the draws."""
     window: float
-    """Of the smoothing, s."""
+    """Window of the smoothing, s."""
 
 
 def resample(record: Prepared, draws: int, seed: int) -> Resampled:

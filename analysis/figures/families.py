@@ -35,7 +35,7 @@ class Family:
     """Data that are drawn alike."""
 
     name: str
-    """Of results: their attribute `results_kind`."""
+    """Name; of results it is their attribute `results_kind`."""
     words: str
     """What messages call such data."""
     drawings: Mapping[str, Drawing]

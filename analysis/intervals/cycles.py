@@ -30,7 +30,7 @@ class Cycle:
     impacts: int
     """p, the smallest that the intervals allow; 0: they do not repeat."""
     duration: float
-    """Of one cycle, s: median sum of p successive intervals; NaN without one."""
+    """Duration of one cycle, s: median sum of p successive intervals; NaN without one."""
     periods: int
     """q; 0: not known."""
     words: str

@@ -27,7 +27,7 @@ class FanoFactor:
     """Variance (ddof 1) over mean of the counts in bins."""
 
     width: float
-    """Of the bins, s."""
+    """Width of the bins, s."""
     value: float = float("nan")
     """With the first bin at the start of the window; NaN, as the others, where there are fewer than 10 bins."""
     standard_error: float = float("nan")

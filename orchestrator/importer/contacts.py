@@ -47,12 +47,12 @@ class ContactBonds:
             for c in connections
             if _is_contact_force(components[c.target[0]], c.target[1])
         ]
-        """Those of a body's contact port, which follows the force and slopes of a stop."""
+        """Contacts of a body's contact port, which follows the force and slopes of a stop."""
         inputs: dict[tuple[str, str], ForceInput] = {}
         self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
-        """Those of any other body, which holds a force over a step."""
+        """Contacts of any other body, which holds a force over a step."""
         self.pairs = Pairs(components, pairs, inputs)
-        """Those of two bodies that hit each other."""
+        """Contacts of two bodies that hit each other."""
         self._components, self._inputs = components, inputs
         self._rigid: dict[str, RigidStop] = {}
         self._held: list[HeldForceBond] = []
@@ -143,7 +143,7 @@ class ContactBonds:
 
     @property
     def impacts(self) -> tuple[list[ContactImpacts], list[ContactImpacts]]:
-        """Those of contacts with stops, and those of pairs, each in the order of their specifications."""
+        """Impacts of contacts with stops, and of pairs, each in the order of their specifications."""
         return [bond.impacts for bond in self.held], [pair.impacts for pair in self.pairs.specified]
 
     def remarks(self) -> list[str]:

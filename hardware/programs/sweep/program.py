@@ -51,9 +51,9 @@ class SweepReport:
     steps: int
     """Steps in the dataset."""
     before: int
-    """Those that were there before."""
+    """Steps that were there before."""
     planned: int
-    """Those of the whole sweep."""
+    """Steps of the whole sweep."""
     stopped: bool
     """Whether it was stopped before its end."""
 
