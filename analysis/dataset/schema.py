@@ -393,7 +393,7 @@ def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAME
     >>> file_names(["ball.h", "ball[h]", "BALL.h", "2.time", "time"])
     ('ball_h', 'ball_h_2', 'BALL_h_3', 'variable_2_time', 'time_2')
     """
-    used = {name.lower() for name in taken}
+    used = set(map(str.lower, taken))
     found: dict[str, str] = {}
     for quantity in quantities:
         if quantity in found:
@@ -434,9 +434,10 @@ def quantity_unit(name: str, system: UnitSystem) -> str:
 def known_unit(name: str) -> str | None:
     """Return the SI unit of a quantity by the end of its name, or None if no known quantity ends it."""
     # The number of one of several alike (velocity_2) does not change what it is.
-    words = name.rstrip("0123456789_").split("_")
-    ends = ("_".join(words[start:]) for start in range(len(words)))
-    return next((_QUANTITY_UNITS[end] for end in ends if end in _QUANTITY_UNITS), None)
+    end = name.rstrip("0123456789_")
+    while end and end not in _QUANTITY_UNITS:
+        end = end.partition("_")[2]
+    return _QUANTITY_UNITS.get(end)
 
 
 def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
