@@ -1,10 +1,9 @@
-"""The tables of keys in docs/scene.md, made of the fields: `python docs/site/key_tables.py`."""
+"""The tables of keys in docs/scene, made of the fields: `python docs/site/key_tables.py`."""
 
 from __future__ import annotations
 
 import math
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -22,6 +21,9 @@ from vibroimpact.orchestrator.scene import (
 )
 from vibroimpact.orchestrator.scene.fields import bounds_of, choices_of, forms_of, rule_of
 
+DOCS = Path(__file__).parents[1]
+PAGES = [DOCS / "scene.md", *sorted((DOCS / "scene").glob("*.md"))]
+"""Pages with tables of keys."""
 _MARKED = re.compile(
     r"(?P<begin><!-- keys of (?P<model>\w+) -->\n).*?(?P<end><!-- end of keys -->)", re.DOTALL
 )
@@ -141,5 +143,5 @@ def _short(number: float) -> str:
 
 
 if __name__ == "__main__":
-    for path in map(Path, sys.argv[1:] or ["docs/scene.md"]):
+    for path in PAGES:
         path.write_text(with_key_tables(path.read_text(encoding="utf-8")), encoding="utf-8")

@@ -34,9 +34,9 @@ def test_help_names_every_target() -> None:
     assert listed == targets()
 
 
-def test_the_readme_names_every_target_a_developer_needs() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert [name for name in targets() - {"clean"} if f"make {name}" not in readme] == []
+def test_the_page_for_contributors_names_every_target_they_need() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert [name for name in targets() - {"clean"} if f"make {name}" not in page] == []
 
 
 def test_a_python_that_is_given_has_an_environment_of_its_own() -> None:
