@@ -59,5 +59,5 @@ def replay(
     keys = fit if isinstance(fit, str) else ",".join(fit)
     whole = replay_scene(chosen, fitted_on, fit=keys or None, score=scored, execution=execution)
     if target is not None:
-        write_results(whole.dataset, target, kind="replay")
+        write_results(whole.dataset, target)
     return whole.dataset

@@ -133,7 +133,7 @@ def _replay(scene: Scene, folder: Path, fit: str | None = None, score: list[str]
         fitted = [replay.name for replay in whole.replays if replay.use == "fitted"]
         text = fitted_scene_text(scene, whole.fit, fitted, folder)
         write_atomically(folder / "fitted.toml", text.encode())
-    write_results(whole.dataset, folder / "replay.nc", kind="replay")
+    write_results(whole.dataset, folder / "replay.nc")
 
 
 def main(arguments: list[str]) -> int:

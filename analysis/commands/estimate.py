@@ -83,8 +83,7 @@ def bounces_of(options: EstimateBounces, spelling: Spelling = typed) -> None:
         seen = side or side_of_stop(options.data, options.run, recording, channel)
         found = estimate_bounces(cut(channel, options.start, options.stop_time), side=seen)
         print_impacts(console, found)
-    dataset = found.dataset().assign_attrs(estimates="bounces")
-    _write(console, _sourced(dataset, options.data, recording), options)
+    _write(console, _sourced(found.dataset(), options.data, recording), options)
 
 
 def response_of(options: EstimateResponse, spelling: Spelling = typed) -> None:

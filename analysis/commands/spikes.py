@@ -46,7 +46,7 @@ def find_spikes(options: Spikes, spelling: Spelling = typed) -> None:
     dataset = dataset.assign_attrs(spelled(dataset.attrs, spelling), source=data.name)
     if output is not None:
         with writing(output):
-            write_results(dataset, output, kind="spikes")
+            write_results(dataset, output)
         console.print(f"Dataset written to {output}.")
     if figure is not None:
         with writing(figure):

@@ -206,6 +206,8 @@ class ImpactEstimates:
     impact_times: Floats = field(default_factory=lambda: np.empty(0))
     motion: FittedMotion | None = None
     of_speed: RestitutionOfSpeed | None = None
+    kind: str = "impacts"
+    """`impacts`, or `bounces` under a constant force."""
 
     def reasons(self, method: str) -> list[str]:
         """Return what makes the estimates of a method unsure."""
@@ -264,6 +266,7 @@ class ImpactEstimates:
     def _attributes(self) -> dict[str, str | float]:
         """Return what belongs to the whole table."""
         return {
+            "estimates": self.kind,
             "channel": self.channel,
             "confidence": self.confidence,
             "verdict": self.verdict,

@@ -127,6 +127,7 @@ def estimate_bounces(
         impact_times=seen.impact_times,
         of_speed=of_speed,
         motion=FittedMotion(channel.time, channel.values, seen.fitted, FLIGHT_TIMES),
+        kind="bounces",
     )
 
 

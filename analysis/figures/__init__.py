@@ -17,14 +17,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.kinds import KINDS, draw_view
+from vibroimpact.analysis.figures.kinds import KINDS, Result, draw_view
 from vibroimpact.analysis.figures.measured.planned_drive import draw_planned_drive
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label, laid_out, save
 from vibroimpact.analysis.figures.study.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.sweep.diagrams import largest_impact_velocity
 from vibroimpact.analysis.figures.window import View, Window
-from vibroimpact.analysis.orbits.classify import ClassesOfRuns
-from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
 
@@ -44,7 +42,7 @@ __all__ = [
 
 
 def draw(
-    data: xr.Dataset | Recording | FoundOrbits | ClassesOfRuns,
+    data: xr.Dataset | Recording | Result,
     kind: str = "auto",
     run: int | None = None,
     *,
@@ -63,7 +61,7 @@ def draw(
 
     Parameters
     ----------
-    data : xarray.Dataset, Recording, or list of orbits or classes
+    data : xarray.Dataset, Recording, or a result with a dataset
         As `open_dataset` gives a dataset, `open_measured` what an analysis found or a benchmark measured,
         `open_recording` a recording, `find_orbits` orbits, `classify` classes; what any function of `vi` returns.
     kind : str
@@ -116,7 +114,7 @@ T = TypeVar("T", bound=Axes | Sequence[Axes] | npt.NDArray[Any])
 
 def draw_into(
     axes: T,
-    data: xr.Dataset | Recording | FoundOrbits | ClassesOfRuns,
+    data: xr.Dataset | Recording | Result,
     kind: str = "auto",
     run: int | None = None,
     *,

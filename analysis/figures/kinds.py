@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
@@ -11,13 +11,20 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.figures.families import FAMILIES, Family, load_families
 from vibroimpact.analysis.figures.measured.replay import recordings_of
 from vibroimpact.analysis.figures.window import View
-from vibroimpact.analysis.orbits.classify import ClassesOfRuns
-from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 
-Data = xr.Dataset | Recording | FoundOrbits | ClassesOfRuns
+
+class Result(Protocol):
+    """A result of `vi` whose dataset is drawn: estimates, spikes, orbits, classes."""
+
+    @property
+    def dataset(self) -> Any:
+        """Dataset, or a method that returns it."""
+
+
+Data = xr.Dataset | Recording | Result
 # More values than this are told by their ends.
 _MOST_LISTED = 6
 
@@ -34,8 +41,7 @@ def draw_view(data: Data, kind: str, view: View) -> Figure:
     """
     if kind != "auto" and kind not in KINDS:
         raise UsageError(f"figure: kind: expected one of auto, {', '.join(KINDS)}, got {kind!r}.")
-    if isinstance(data, ClassesOfRuns):
-        data = data.dataset
+    data = _dataset_of(data)
     family = _family(data)
     chosen = family.usual_kind(data, view) if kind == "auto" else kind
     drawing = family.drawings.get(chosen)
@@ -56,7 +62,16 @@ def draw_view(data: Data, kind: str, view: View) -> Figure:
 
 def fitting(data: Data) -> list[str]:
     """Return the kinds that fit data."""
+    data = _dataset_of(data)
     return _family(data).fitting(data)
+
+
+def _dataset_of(data: Any) -> Any:
+    """Return the dataset of a result; objects of a family are drawn themselves."""
+    if isinstance(data, (xr.Dataset, *filter(None, (family.type for family in FAMILIES.values())))):
+        return data
+    found = getattr(data, "dataset", data)
+    return found() if callable(found) else found
 
 
 def _family(data: Any) -> Family:
@@ -66,7 +81,7 @@ def _family(data: Any) -> Family:
             return family
     if not isinstance(data, xr.Dataset):
         raise UsageError(
-            f"figure: expected a dataset or a recording, got {type(data).__name__}. "
+            f"figure: expected a dataset, a recording or a result, got {type(data).__name__}. "
             "open_dataset, open_measured and open_recording open files."
         )
     written = str(data.attrs.get("results_kind", ""))
@@ -77,7 +92,13 @@ def _family(data: Any) -> Family:
         raise DatasetError(
             f"results: expected a kind that can be drawn ({', '.join(results)}), got {written!r}."
         )
-    return FAMILIES["runs" if "run_index" in data.variables else "ladder"]
+    if "run_index" in data.variables:
+        return FAMILIES["runs"]
+    if not {"macro_step", "wall_time"} & set(data.variables):
+        raise DatasetError(
+            "figure: expected runs (run_index) or a result (attribute results_kind), got a dataset with neither."
+        )
+    return FAMILIES["ladder"]
 
 
 def _refuse_options(data: Any, family: Family, kind: str, view: View) -> None:

@@ -115,7 +115,7 @@ def interval_report(
         "forcing_period": forcing_period or 0.0,
         "seed": seed,
     }
-    return xr.Dataset(described(rows), attrs=attributes)
+    return xr.Dataset(described(rows), attrs={"results_kind": "spikes", **attributes})
 
 
 def read_motion(train: IntervalTrain, forcing_period: float | None) -> tuple[Cycle, Lattice]:

@@ -17,8 +17,8 @@ def channel_of(signal: Channel | xr.DataArray) -> Channel:
     ----------
     signal : Channel or xarray.DataArray
         An array has one dimension with its instants as coordinate: numbers in seconds, or in the unit of the
-        coordinate's `units`, or times of NumPy. Its `units` is its unit; without, it is a pure number. Samples that are
-        NaN count as missing.
+        coordinate's `units` (`1` in a nondimensional run), or times of NumPy. Its `units` is its unit; without, it is
+        a pure number. Samples that are NaN count as missing.
 
     Raises
     ------
@@ -94,6 +94,7 @@ def _instants(signal: xr.DataArray, name: str) -> Floats:
     if time.dtype.kind not in "fiu":
         raise DatasetError(f"{name}: {chosen}: expected instants, got values of the type {time.dtype}.")
     unit = measured_unit(str(time.attrs.get("units", "s")))
-    if unit.si != "s":
+    # without units, as in a nondimensional run, time is in the unit of the motion
+    if unit.si not in ("s", "1"):
         raise DatasetError(f"{name}: {chosen}: expected instants in seconds, got the unit {unit.label}.")
     return np.asarray(time.values, dtype=np.float64) * unit.factor

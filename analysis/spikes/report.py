@@ -276,6 +276,7 @@ def _attributes(
     """Return what is said in words, and every setting that numbers came from."""
     settings = found.settings
     attributes: dict[str, str | float | int | None] = {
+        "results_kind": "spikes",
         "channel": channel.name,
         "method": found.method,
         "method_reason": found.reason,

@@ -147,7 +147,7 @@ def _save_scene(scene: Scene, fit: ReplayFit, recordings: Sequence[str], path: P
 
 def _write(dataset: xr.Dataset, output: Path, figure: Path | None) -> None:
     try:
-        write_results(dataset, output, kind="replay")
+        write_results(dataset, output)
         if figure is not None:
             # matplotlib takes half a second to import; a replay alone does not pay for it.
             from vibroimpact.analysis import figures

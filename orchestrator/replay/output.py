@@ -49,7 +49,7 @@ class Replayed:
 def replay_dataset(
     replays: Sequence[Replayed], fit: ReplayFit | None = None, verdict: Verdict | None = None
 ) -> xr.Dataset:
-    """Return the dataset of replays of one scene, ready for `write_results(kind="replay")`.
+    """Return the dataset of replays of one scene, ready for `write_results`.
 
     Signals and scores are those of `comparison_dataset`, of all recordings one after the other; `recording` and `use`
     say which. `drive_K` on `drive_time_K` and `simulated_impact_K` belong to recording K (from 1). Fitted numbers are
@@ -65,9 +65,9 @@ def replay_dataset(
         dataset["use"] = ("comparison", [r.use for r in owners], _words("what the recording was used for"))
     if fit is not None:
         dataset = dataset.assign(_of_fit(fit))
-    attrs: dict[str, Any] = {}
+    attrs: dict[str, Any] = {"results_kind": "replay"}
     if verdict is not None:
-        attrs = {
+        attrs |= {
             "verdict": verdict.words,
             "trusted": int(verdict.trusted),
             "reasons": "\n".join(verdict.reasons),

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.families import Drawing, Family, register, whole
 from vibroimpact.analysis.figures.measured.recordings import outline
 from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, legend_above, page_style
 from vibroimpact.analysis.spikes.report import SpikeReport
@@ -108,3 +109,14 @@ def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: Any) -> Non
     if len(time) > _MOST_POINTS:
         time, values = outline(time, values, -(-4 * len(time) // _MOST_POINTS))
     axis.plot(time, values, rasterized=True, **style)
+
+
+register(
+    Family(
+        "spike report",
+        "the spikes of a signal",
+        {"recording": Drawing(whole(draw_spikes))},
+        type=SpikeReport,
+        is_of_results=False,
+    )
+)

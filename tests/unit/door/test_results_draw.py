@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from support.command_line import in_this_process
 from support.places import EXAMPLES
+from support.replay_scenes import BOARD, hit
 
 import vibroimpact as vi
 from vibroimpact.analysis.figures.families import FAMILIES, Family, register
@@ -98,6 +99,32 @@ def test_basins_are_drawn_and_bear_their_kind(scene: vi.Scene, tmp_path: Path) -
 @pytest.mark.skipif(importlib.util.find_spec("pythonfmu") is None, reason="the controller is in Python")
 def test_a_kept_orbit_is_drawn(scene: vi.Scene) -> None:
     drawn(vi.control(scene, 1.0, 0.97, step=1e-2))
+
+
+def test_estimates_spikes_and_intervals_are_drawn() -> None:
+    record = {"transient_periods": 50, "recorded_periods": 40}
+    sampled = record | {"time_series": {"rate": 20, "variables": ["displacement"]}}
+    run = vi.run(vi.Scene.from_dict(FORCED | {"record": sampled}), progress=False)
+    tip = run.vibroimpact.samples().displacement
+    drawn(vi.estimate_impacts(tip, vi.Forcing(angular_frequency=1.0), methods=("trajectory",)))
+    drawn(vi.spike_report(tip))
+    drawn(vi.estimate_decay(tip.copy(data=np.exp(-0.02 * tip.time) * np.cos(3.0 * tip.time))))
+    drawn(vi.interval_report(np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 200))))
+
+
+def test_a_replay_is_drawn_before_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / "board.toml").write_text(BOARD)
+    hit(tmp_path)
+    found = vi.replay(tmp_path / "board.toml", tmp_path / "hit.nc")
+    drawn(found)
+    assert found.attrs["results_kind"] == "replay"
+
+
+def test_a_dataset_that_nobody_here_made_is_refused_by_what_it_lacks() -> None:
+    with pytest.raises(
+        DatasetError, match=r"expected runs \(run_index\) or a result .* got a dataset with neither"
+    ):
+        vi.draw(xr.Dataset({"a": ("x", [1.0, 2.0])}))
 
 
 def test_transients_are_drawn(scene: vi.Scene) -> None:
