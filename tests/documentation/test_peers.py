@@ -30,7 +30,7 @@ def test_a_cheaper_peer_makes_the_goal_missed() -> None:
     row = next(r for r in rows if r["way"] == "solve_ivp DOP853" and r["case"] == "orbit")
     row |= {"error": 0.1 * GOAL_ERROR, "cost": rows[0]["cost"]}
     said = measurement(RECORD | {"rows": rows})
-    assert "P(1,1) orbit: **missed**, 1 times (solve_ivp DOP853" in said
+    assert "| P(1,1) orbit | **missed** | solve_ivp DOP853, rtol 0.001 | 1 |" in said
 
 
 def test_a_page_without_markers_is_refused() -> None:

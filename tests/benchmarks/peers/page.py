@@ -30,7 +30,7 @@ def measurement(record: Mapping[str, Any]) -> str:
     """Return machine, goals, references and table in Markdown."""
     host = "; ".join(f"{key} {value}" for key, value in record["machine"].items())
     parts = [
-        f"Measured on {record['date']}:\n{host}.",
+        f"Measured on {record['date']}.\nMachine and versions:\n{host}.",
         _goals(record),
         _references(record),
         _growth(record),
@@ -45,66 +45,75 @@ def _of(record: Mapping[str, Any], case: Mapping[str, Any]) -> tuple[Mapping[str
 
 
 def _goals(record: Mapping[str, Any]) -> str:
+    """Return both goals, met or missed."""
     lines = [
-        f"- Goal: below an error of {GOAL_ERROR:g} the fused FMU costs {GOAL_RATIO:g} times less than any peer."
+        f"**Goal**: at errors below {GOAL_ERROR:g} the fused FMU costs {GOAL_RATIO:g} times less than any peer.",
+        "",
+        "| problem | goal | cheapest peer at such errors | cost over ours | cheapest single motion | cost over ours |",
+        "|---|---|---|---|---|---|",
     ]
-    for case in record["cases"]:
-        own, rows = _of(record, case)
-        near = [
-            row
-            for row in rows
-            if not row["ours"] and not row["failure"] and row["cost"] and row["error"] is not None
-            if row["error"] < GOAL_ERROR
-        ]
-        if not near:
-            lines.append(f"  - {case['title']}: **met**, no peer gets below.")
-            continue
-        best = min(near, key=lambda row: float(row["cost"]))
-        ratio = best["cost"] / own["cost"]
-        single = min(
-            (r for r in near if "vmapped" not in r["way"]), key=lambda r: float(r["cost"]), default=best
-        )
-        word = "met" if ratio >= GOAL_RATIO else "missed"
-        more = "" if single is best else f", and of single motions {_ratio(single, own)} ({single['way']})"
-        lines.append(
-            f"  - {case['title']}: **{word}**, {ratio:.2g} times ({best['way']}, {_setting(best)}){more}."
-        )
+    lines += [_goal(record, case) for case in record["cases"]]
     grazes, rungs = _of(record, next(case for case in record["cases"] if case["key"] == "grazes"))
     rest, _ = _of(record, next(case for case in record["cases"] if case["key"] == "chatter"))
     full = sorted({row["way"] for row in rungs if not row["ours"] and not row["failure"]})
     found = "met" if not grazes["failure"] and rest["rest_error"] is not None else "missed"
-    seen = f"{grazes['impacts_seen']} of 11 grazes, no stop out of reach hit"
-    lines.append(
-        f"- Goal: all grazes and the end of chatter are found by ours: **{found}**\n  ({seen}; the end of chatter to "
-        f"{rest['rest_error']:.0e} of a period).\n  Peers that find all grazes at one setting or more: "
-        f"{', '.join(full) or 'none'}."
-    )
-    lines.append(
-        f"- A fused run of one period costs {record['one_period'] * 1e6:.0f} us through `vi.run`'s runner, whatever "
-        "it does:\n  much of what these short motions cost, which a longer one does not pay again."
-    )
+    lines += [
+        "",
+        f"**Goal**: the fused FMU finds all grazes and the end of chatter: **{found}**.",
+        f"It finds {grazes['impacts_seen']} of 11 grazes, and hits no stop out of reach.",
+        f"The end of chatter is right to {rest['rest_error']:.0e} of a period.",
+        f"Peers that find all grazes at one setting or more: {', '.join(full) or 'none'}.",
+        "",
+        f"A fused run of one period costs {record['one_period'] * 1e6:.0f} µs through the runner of `vi.run`, "
+        "whatever it simulates.",
+        "That is a large part of the cost of these short motions. A longer motion pays it once.",
+    ]
     return "\n".join(lines)
 
 
+def _goal(record: Mapping[str, Any], case: Mapping[str, Any]) -> str:
+    """Return the row of a problem: whether the goal is met, and the cheapest peers below the goal's error."""
+    own, rows = _of(record, case)
+    near = [
+        row
+        for row in rows
+        if not row["ours"] and not row["failure"] and row["cost"] and row["error"] is not None
+        if row["error"] < GOAL_ERROR
+    ]
+    if not near:
+        return f"| {case['title']} | **met** | none | - | none | - |"
+    best = min(near, key=lambda row: float(row["cost"]))
+    single = min((r for r in near if "vmapped" not in r["way"]), key=lambda r: float(r["cost"]), default=best)
+    word = "met" if best["cost"] / own["cost"] >= GOAL_RATIO else "missed"
+    peers = (f"{row['way']}, {_setting(row)} | {_ratio(row, own)}" for row in (best, single))
+    return f"| {case['title']} | **{word}** | {' | '.join(peers)} |"
+
+
 def _references(record: Mapping[str, Any]) -> str:
+    """Return the largest difference between the reference and an independent one, by problem."""
     cells = [
-        f"{case['title']} {case['second_road']:.0e}"
+        f"| {case['title']} | {case['second_road']:.0e} |"
         for case in record["cases"]
         if case["second_road"] is not None
     ]
-    return (
-        "The reference beside a second road, DOP853 at 1e-13 with nothing of this package, on "
-        f"grazes the flow in 40 digits\n(largest error, of both together):\n{', '.join(cells)}."
-    )
+    lines = [
+        "A second computation checks the reference with no code of this package:",
+        "DOP853 at 1e-13, and for grazes the flow in 40 digits.",
+        "The table has their largest difference, with the errors of both:",
+        "",
+        "| problem | largest error |",
+        "|---|---|",
+    ]
+    return "\n".join([*lines, *cells])
 
 
 def _growth(record: Mapping[str, Any]) -> str:
-    """Return how the error of chaotic motion grows from impact to impact, of each way at its finest setting."""
+    """Return the error of chaotic motion from impact to impact, of each way at its finest setting."""
     finest = {row["way"]: row for row in record["rows"] if row["growth"] and not row["failure"]}
     most = max((len(row["growth"]) for row in finest.values()), default=0)
     lines = [
-        "Error growth in chaos, of each way at its finest setting that misses no impact: relative error of the",
-        "velocity of the first impacts.",
+        "The growth of errors in chaos: relative error of the velocity of the first impacts.",
+        "Each way has its finest setting that misses no impact:",
         "",
         "| way | setting | " + " | ".join(str(place + 1) for place in range(most)) + " |",
         "|---|---|" + "---|" * most,
@@ -116,7 +125,7 @@ def _growth(record: Mapping[str, Any]) -> str:
 
 
 def _table(record: Mapping[str, Any]) -> str:
-    lines = ["| problem | way | setting | error | us a period | times fused |", "|---|---|---|---|---|---|"]
+    lines = ["| problem | way | setting | error | µs a period | times fused |", "|---|---|---|---|---|---|"]
     for case in record["cases"]:
         own, rows = _of(record, case)
         for row in rows:
