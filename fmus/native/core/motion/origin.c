@@ -1,6 +1,7 @@
 #include "motion/origin.h"
 
-/* Decay (times decay rate) after which a damped motion is counted anew: its bounds, taken at the origin, stay tight. */
+/* Decay rate times time above which a damped motion gets a new origin. Its bounds are taken at the origin and stay
+ * tight below this value. */
 static const double KEPT = 0.1;
 
 static bool goes_on(const vi_origin *origin, const vi_segment *segment, double x, double v)

@@ -9,7 +9,7 @@
 #include "body/modal/structure/contact.h"
 #include "contact/complementarity.h"
 
-/* Of a contact whose point others hold, a force of so many roundings is none. */
+/* Force, in roundings, up to which a contact whose point others hold counts as without force. */
 static const double LITTLE = 16.0;
 
 static bool gives_way(const vi_structure *s, int k)
@@ -17,12 +17,12 @@ static bool gives_way(const vi_structure *s, int k)
     return s->model->stop[k] == VI_YIELDING_STOP;
 }
 
-/* Contacts that touch without speed, the rigid ones first: a compliant stop presses only once it is pressed in. */
+/* Contacts that touch without speed, rigid stops first: a compliant stop presses only once it is pressed in. */
 typedef struct {
     int index[VI_PORTS];
     int count, rigid;
-    double gap[VI_PORTS];  /* acceleration away from the stop that is left, m/s^2 */
-    double push[VI_PORTS]; /* forces of the rigid ones, N */
+    double gap[VI_PORTS];  /* remaining acceleration away from the stop, m/s^2 */
+    double push[VI_PORTS]; /* forces of the rigid stops, N */
 } resting_contacts;
 
 static void order_resting(const vi_structure *s, const int candidate[], resting_contacts *resting)
@@ -38,7 +38,7 @@ static void order_resting(const vi_structure *s, const int candidate[], resting_
     }
 }
 
-/* The forces of the rigid stops, which only push, and what they leave of each contact's acceleration. */
+/* Find the forces of the rigid stops, which only push, and the remaining acceleration of each contact. */
 static void push_resting(const vi_structure *s, double g[VI_PORTS][VI_PORTS], resting_contacts *resting)
 {
     double acceleration[VI_MODES], force[VI_PORTS], small[VI_PORTS][VI_PORTS], b[VI_PORTS];
@@ -60,7 +60,7 @@ static void push_resting(const vi_structure *s, double g[VI_PORTS][VI_PORTS], re
     }
 }
 
-/* What a contact that touches without speed does: `push` is the acceleration that its stop would have to take. */
+/* Decide about a contact that touches without speed; `push` is the acceleration that its stop would have to take. */
 static void decide(const vi_structure *s, int k, double gap, double push)
 {
     vi_held_view view;
@@ -85,7 +85,7 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     }
 }
 
-/* The rigid stop that pushes most, of those that have not been asked yet: what it holds leaves the others idle. */
+/* The rigid stop with the largest push among those not yet decided: contacts that it holds leave the others idle. */
 static int next_rigid(const resting_contacts *resting, const int asked[])
 {
     int most = -1;
