@@ -18,7 +18,7 @@ static vi_lanes_rounds compiled(int wanted)
                                             : vi_lanes_rounds_baseline;
 }
 #else
-/* The baseline of other machines is all that they have (NEON on arm64). */
+/* Other machines have only their baseline (NEON on arm64). */
 static bool has(int wanted)
 {
     return wanted == VI_INSTRUCTIONS_BASELINE;

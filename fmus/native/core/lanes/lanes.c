@@ -6,19 +6,19 @@
 #include "lanes/instructions.h"
 #include "lanes/lane_run.h"
 
-/* Rounds of attending the lanes between two looks at the clock. */
+/* Rounds of attending the lanes between two readings of the clock. */
 enum { ROUNDS_UNHEARD = 64 };
-/* Rows that one attending of the lanes may write. */
+/* Most rows written when all lanes are attended once. */
 enum { MOST_ROWS = 8 * VI_LANES };
 
-/* What is under way between two calls. */
+/* State that is kept between two calls. */
 typedef struct {
-    vi_lane_group group; /* first: aligned as vectors are */
+    vi_lane_group group; /* first member: aligned like vectors */
     vi_lane_run run[VI_LANES];
     int64_t begun;
 } under_way;
 
-enum { ALIGNMENT = 64 };
+enum { ALIGNMENT = 64 }; /* of the state, bytes */
 
 static under_way *aligned(void *memory)
 {
@@ -51,7 +51,7 @@ static bool works(const vi_lanes_work *work)
     return found;
 }
 
-/* Lanes without a point take what can begin. */
+/* Begin points in the lanes without a point, as far as points can begin. */
 static void take_all(vi_lanes_work *work)
 {
     for (int lane = 0; lane < VI_LANES; ++lane) {
