@@ -4,7 +4,7 @@
 
 #include "motion/clock.h"
 
-enum { VI_MESSAGE_LENGTH = 1024 };
+enum { VI_MESSAGE_LENGTH = 1024 }; /* bytes, with the end */
 
 /* Add a problem to a message. Text beyond the message's length is cut and replaced by "...". */
 void vi_complain(char message[VI_MESSAGE_LENGTH], const char *format, ...);

@@ -7,7 +7,7 @@
 
 enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
 enum { NOT_BEGUN = 0, BEFORE_RECORDING = 1, RECORDING = 2, AT_END = 3 };
-/* What a piece of a run comes to, beside VI_RUNS_*. */
+/* Results of a part of a run, besides VI_RUNS_*. */
 enum { GO_ON = 0, RUN_ENDS = -1 };
 
 static bool went_well(int status)
@@ -15,7 +15,7 @@ static bool went_well(int status)
     return status >= 0 && status <= STATUS_WARNING;
 }
 
-/* Start where the run before ended, on the stop that has moved beyond it. */
+/* Start where the previous run ended; a body beyond a stop that has moved starts on this stop at rest. */
 static void carry(const vi_runs_plan *plan, const double carried[2], double values[])
 {
     double displacement = carried[0], velocity = carried[1];
@@ -63,7 +63,7 @@ static int begin(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points 
     return good ? GO_ON : VI_RUNS_REFUSED;
 }
 
-/* Take the rows that the body has recorded. */
+/* Take the rows recorded by the body. */
 static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
 {
     if (p->rows_room - p->rows_used < plan->row_capacity) {
@@ -87,7 +87,7 @@ static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_poi
     return GO_ON;
 }
 
-/* One step towards `end`; RUN_ENDS where the run has come to its limit. */
+/* Make one step towards `end`; RUN_ENDS where the run has reached its limit. */
 static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
 {
     bool needs_event = false, ends = false, early = false;
@@ -106,7 +106,7 @@ static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
     return GO_ON;
 }
 
-/* Advance to `end`. The rows are taken where a step has ended early, and there is time to listen. */
+/* Advance to `end`. After a step that ended early, rows are taken and the time is checked. */
 static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double end, double call)
 {
     while (p->time < end) {
@@ -155,7 +155,7 @@ static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points
     return GO_ON;
 }
 
-/* Run the point under way to its end. */
+/* Run the present point to its end. */
 static int go_on(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double call)
 {
     int came_to = GO_ON;

@@ -12,7 +12,7 @@
 
 #include "lanes/lane_points.h"
 
-enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 };
+enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 }; /* cells of a round; order of the Taylor polynomials */
 
 /* Speed of a rebound, relative to the largest approach, below which it may begin the end of a chatter, as in
  * chatter.c. */

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 };
+enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 }; /* most modes and contacts of a body */
 
 /* State of a point. */
 enum {

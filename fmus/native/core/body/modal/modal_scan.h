@@ -11,7 +11,7 @@
 
 #include "body/modal/modal_flight.h"
 
-enum { VI_SCAN_SAMPLES = 8, VI_SCAN_LEVELS = 16 };
+enum { VI_SCAN_SAMPLES = 8, VI_SCAN_LEVELS = 16 }; /* samples of a block; lengths of steps */
 
 /* Propagators over 1 to VI_SCAN_SAMPLES steps of one length. */
 typedef struct {

@@ -232,8 +232,8 @@ double vi_structure_within(const vi_structure *s, double displacement);
 double vi_structure_displacement_size(const vi_structure *s, int k);
 double vi_structure_velocity_size(const vi_structure *s, int k);
 
-/* Upper bound of the size of the acceleration of contact k, m/s^2, at lower cost; HUGE_VAL where a stop presses, or an
- * input has a slope. */
+/* Upper bound of the acceleration of contact k, m/s^2, at lower cost; HUGE_VAL where a stop presses, or an input has a
+ * slope. */
 double vi_structure_most_acceleration(const vi_structure *s, int k);
 
 /* Is the largest force of contact k followed? It is only where its impact is recorded. */
