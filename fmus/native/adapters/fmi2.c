@@ -1,8 +1,7 @@
 /* FMI 2.0 over vi_this_component. Co-simulation of FMI 2.0 has no event mode: see event_time in the model description.
  *
  * Only fmi2Discard could announce a step that ends early (a full record, impact_limit), and no stock importer continues
- * after it. So steps never end early here. Rows beyond the record are counted as dropped, and reaching impact_limit is
- * an error.
+ * after it. So no step ends early here: rows beyond the record count as dropped, and reaching impact_limit is an error.
  */
 #include "fmi2Functions.h"
 

@@ -93,8 +93,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
 {
     static const char function[] = "fmi3InstantiateCoSimulation";
     /* FMI lets an importer require only variables described as intermediate, and this component has none; yet some
-     * importers require all variables they record. The callback is never called, and all values are there at the end of
-     * a step. */
+     * require all variables they record. The callback is never called; all values are there at the end of a step. */
     vi_instance *instance = instantiate(function, instanceName, instantiationToken, resourcePath, loggingOn,
                                         instanceEnvironment, logMessage);
     if (instance != NULL) {

@@ -1,5 +1,4 @@
-/* The remaining functions of FMI 3.0: importers look all of them up, so each is exported and answers that it is not
- * available. */
+/* The remaining functions of FMI 3.0: importers look them up, so each is exported and answers "not available". */
 #include "fmi3Functions.h"
 
 #include "instance.h"

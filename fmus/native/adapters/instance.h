@@ -43,13 +43,12 @@ struct vi_instance {
     vi_sizes sizes;          /* of the description */
     vi_start *starts;        /* start values of the description that differ from the component's */
     size_t start_count;
-    uint32_t *references;    /* the component's references for 1, 2, ... of the description; NULL: they are the same */
+    uint32_t *references;    /* the component's references for 1, 2, ... of the description; NULL: the same */
     size_t reference_count;
     void *resources;         /* resources opened by the component; NULL for most components */
 };
 
-/* Is this token the component's? Its last twelve digits are an export's own, so that two exports are two FMUs to any
- * tool. */
+/* Is this token the component's? Its last twelve digits are an export's own, so exports are different FMUs. */
 bool vi_token_fits(const char *token);
 
 /* A new instance; NULL when memory is out. */
@@ -69,8 +68,7 @@ bool vi_token_is_of_export(const char *token);
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
 void vi_instance_warn(const vi_instance *instance, const char *function, const char *format, ...);
 
-/* Set the start and the stop time, infinite without a stop time. Returns false, after logging, when the stop time lies
- * before `start`. */
+/* Set start and stop time (infinite: none). Returns false, after logging, when the stop time lies before `start`. */
 bool vi_instance_set_experiment(vi_instance *instance, const char *function, double start, double stop);
 
 /* Does a step from `time` by `size` end by the stop time, within rounding? If not, log it. */
@@ -82,8 +80,7 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 /* Change the mode from one of these modes to another. */
 bool vi_instance_enter(vi_instance *instance, const char *function, int from, vi_mode_of_use to);
 
-/* End initialization: false, after logging the component's message, when a parameter is bad. A warning is logged
- * too. */
+/* End initialization: false, after logging the component's message, when a parameter is bad. Warnings are logged. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
 
 /* Present time, s. */

@@ -1,5 +1,4 @@
-/* Model exchange for both versions of FMI: the importer integrates the instance's states. Calls that are not allowed
- * are logged. */
+/* Model exchange for both versions of FMI: the importer integrates the instance's states. Refused calls are logged. */
 #ifndef VIBROIMPACT_MODEL_EXCHANGE_H
 #define VIBROIMPACT_MODEL_EXCHANGE_H
 

@@ -1,5 +1,4 @@
-/* Components without a motion of their own: outputs follow from inputs and the time, and a step only advances the
- * time. */
+/* Components without a motion of their own: outputs follow from inputs and time; a step only advances the time. */
 #ifndef VIBROIMPACT_PLAIN_H
 #define VIBROIMPACT_PLAIN_H
 

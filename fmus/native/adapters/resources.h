@@ -38,15 +38,13 @@ void vi_sizes_read(const char *folder, vi_sizes *sizes);
 /* Read at most `most` start values, and return their number; 0 when the folder is NULL or lacks the file. */
 size_t vi_starts_read(const char *folder, vi_start starts[], size_t most);
 
-/* Read at most `most` value references of the component, and return their number; 0 when the folder is NULL or lacks
- * the file. */
+/* Read at most `most` value references of the component, and return their number; 0 without folder or file. */
 size_t vi_references_read(const char *folder, uint32_t references[], size_t most);
 
 /* Open a file of the folder of resources for reading bytes; NULL when the folder is NULL or lacks the file. */
 FILE *vi_resource_open(const char *folder, const char *name);
 
-/* The folder of a URI (FMI 2.0): file:///path, file://localhost/path or file:/path, percent-encoded; NULL for other
- * text. */
+/* The folder of a URI (FMI 2.0): file:///path, file://localhost/path or file:/path, percent-encoded; NULL otherwise. */
 const char *vi_folder_of_uri(const char *uri, char folder[VI_PATH_LENGTH]);
 
 #endif

@@ -1,5 +1,5 @@
-/* Saved states of an instance, also as bytes. Both versions of FMI pass their arguments on unchecked: a NULL argument
- * gives false, without a message. */
+/* Saved states of an instance, also as bytes. Arguments come unchecked from FMI: NULL gives false, without a
+ * message. */
 #ifndef VIBROIMPACT_SAVED_STATES_H
 #define VIBROIMPACT_SAVED_STATES_H
 

@@ -72,8 +72,7 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
-/* With event mode a step ends at an edge, where the input is set anew; otherwise edges within a step sample the present
- * input. */
+/* With event mode a step ends at an edge, where the input is set anew; otherwise edges in a step sample its input. */
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     analog_input *it = self;

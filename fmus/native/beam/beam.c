@@ -9,8 +9,7 @@
 
 enum { START_MODES = 4 }; /* default number of modes */
 
-/* Estimated relative error of a natural frequency above which the beam warns: Euler-Bernoulli's theory does not hold.
- * equations.md 6.7 */
+/* Estimated relative error of a natural frequency above which the beam warns. equations.md 6.7 */
 static const double VALIDITY_LIMIT = 0.02;
 /* Shear coefficient of a rectangular section. */
 static const double SHEAR_COEFFICIENT = 5.0 / 6.0;
@@ -290,8 +289,8 @@ static double mode_damping(const beam *b, int j, double natural)
     return b->damping_ratio[j] + 0.5 * (b->rayleigh_mass / natural + b->rayleigh_stiffness * natural);
 }
 
-/* Grid s_k = k / N, or k / (N + 1) where the far end cannot move; its nearest point is moved to `location`. Returns the
- * index of this point. equations.md 6.8 */
+/* Grid s_k = k / N, or k / (N + 1) where the far end cannot move; its nearest point is moved to `location`. Returns its
+ * index. equations.md 6.8 */
 static int find_grid(const beam *b, double location, double s[VI_MODES])
 {
     const int n = (int)b->modes;

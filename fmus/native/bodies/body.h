@@ -80,8 +80,7 @@ vi_body *vi_body_of(void *self);
 /* The engine's view of the parts. */
 vi_structure vi_body_parts(vi_body *c);
 
-/* Complain of the parameters that all bodies have: frequency and phase of the forcing, contact laws, tolerance, limit,
- * shared inputs. */
+/* Complain of parameters of all bodies: frequency and phase of the forcing, contact laws, tolerance, limit, inputs. */
 void vi_body_check(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Number of ports in use: up to the last port with a law. */

@@ -164,8 +164,7 @@ bool vi_body_check_step(const vi_body *c, const vi_step_request *request, vi_ins
     return message[0] == '\0';
 }
 
-/* Check the answer of a rigid stop. A stop that answers with a force has answered once its importer goes on, as forces
- * are inputs. */
+/* Check the answer of a rigid stop. A force needs no answer: it is an input, there once the importer goes on. */
 static void check_answer(const vi_body *c, int k, char *message)
 {
     const vi_contact *contact = &c->contacts[k];

@@ -6,8 +6,7 @@
 
 void vi_body_check_inputs(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
-/* Check that stops at one point of the body leave room, and that no rigid stop hides another; the model must be
- * prepared. */
+/* Check that stops at one point leave room, and that no rigid stop hides another; the model must be prepared. */
 void vi_body_check_points(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Can this step be made? *target: its end. */

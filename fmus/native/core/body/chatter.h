@@ -5,18 +5,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Height of a bounce, relative to the displacements, and length, in radians of the fastest rate. A bounce below either
- * value is tiny. */
+/* Height, relative to the displacements, and length, in radians of the fastest rate, below which a bounce is tiny. */
 #define VI_LOW_HEIGHT 1e-10
 #define VI_SHORT_FLIGHT 1e-7
 
 /* Remaining bounces after an impact: the body leaves its stop at speed `rebound` and is pressed back. */
 typedef struct {
     double rebound, restitution;   /* m/s */
-    double pressure, slope, bend;  /* acceleration towards the stop while held there, m/s^2, and its first two rates */
+    double pressure, slope, bend;  /* acceleration towards the stop while held there, m/s^2, and its two rates */
     double drag;       /* rate at which damping takes the speed, 1/s */
     double fastest;    /* rate of the motion, rad/s */
-    double moving;     /* rate of the motion that goes on while the contact is held, rad/s; 0: nothing moves */
+    double moving;     /* rate of other motion while the contact is held, rad/s; 0: nothing moves */
     double resolution; /* of displacements, m */
     bool tiny;         /* lower than VI_LOW_HEIGHT or shorter than VI_SHORT_FLIGHT */
 } vi_bounces;

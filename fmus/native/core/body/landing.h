@@ -1,5 +1,4 @@
-/* Ends of flights, for all bodies: the end of a segment, the tolerance of a contact, and the bounces that are followed
- * from the stop. */
+/* Ends of flights of all bodies: the end of a segment, the tolerance of a contact, bounces followed from the stop. */
 #ifndef VIBROIMPACT_LANDING_H
 #define VIBROIMPACT_LANDING_H
 
@@ -15,8 +14,8 @@
 /* Length of a bounce, in radians of the fastest rate. A shorter bounce is followed from the stop, not from the origin:
  * only the stop's position is then rounded. */
 #define VI_LOW_BOUNCE 0.1
-/* Distance from the stop, relative to the other displacements. A body that stays closer over a radian is followed from
- * its present place. */
+/* Distance from the stop, relative to other displacements. A body staying closer over a radian is followed from
+ * there. */
 #define VI_LINGERING 1e-6
 /* Time to a contact, in radians of the fastest rate, below which a parabola may locate the contact. */
 #define VI_NEAR_CONTACT 1e-4
@@ -24,8 +23,7 @@
 /* Kind of the end of a segment. */
 typedef enum { VI_ENDS_ANYWHERE, VI_ENDS_AT_TARGET, VI_ENDS_AT_PERIOD } vi_ending;
 
-/* Length of one segment from `now`, s, and the kind of its end. `periods`: segments also end at the ends of forcing
- * periods. */
+/* Length of one segment from `now`, s, and the kind of its end. `periods`: also end at forcing periods. */
 double vi_segment_length(const vi_clock *clock, vi_instant now, vi_instant target, bool periods, vi_ending *ending);
 
 /* The segment's end if a contact at u is, by rounding, at or past this end; otherwise VI_ENDS_ANYWHERE. */
@@ -35,8 +33,7 @@ vi_ending vi_ending_at(vi_ending ending, double u, double length, double room);
 double vi_landing_room(double time);
 
 /* Seconds to the contact, from the parabola that touches the motion here, if time and speed are exact to the last bit;
- * otherwise HUGE_VAL. An exact parabola saves further evaluations. `scale`: sum of the sizes of the displacement's
- * terms. */
+ * otherwise HUGE_VAL. This saves further evaluations. `scale`: sum of the sizes of the displacement's terms. */
 static inline double vi_seconds_to_landing(const vi_approach *p, double fastest, double scale)
 {
     if (!(p->clearance * fastest < VI_NEAR_CONTACT * p->velocity)) {

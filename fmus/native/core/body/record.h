@@ -46,8 +46,7 @@ void vi_record_switched(vi_record *record);
 /* Is there too little room for the rows of one event? */
 bool vi_record_full(const vi_record *record);
 
-/* Does a step end here because the record is full? Only once, as a record that is never emptied would end every
- * step. */
+/* Does a step end here because the record is full? Once, as a record that is never emptied would end all steps. */
 bool vi_record_ends_step(vi_record *record);
 
 void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,

@@ -106,8 +106,7 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
 }
 
 /* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. It is finite for
- * positive definite g, and the bound on the turns is that proof's. Returns 0 at the bound: redundant contacts may make
- * the pivoting cycle. */
+ * positive definite g, with the proof's bound on the turns. Returns 0 at the bound: redundant contacts may cycle. */
 static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], int active[VI_PORTS],
                            double p[VI_PORTS])
 {

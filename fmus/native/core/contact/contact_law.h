@@ -1,8 +1,7 @@
 /* Contact laws: the impulse or force with which a stop answers. The same functions serve the bodies (fused) and the
  * ImpactStop FMU (coupled). A stop only evaluates its law; the body resolves the contact.
  *
- * All laws are rows of one table. No other C file names a law: other files ask for the kind of stop and the form of its
- * force.
+ * All laws are rows of one table. No other C file names a law: they ask for the kind of stop and the form of its force.
  */
 #ifndef VIBROIMPACT_CONTACT_LAW_H
 #define VIBROIMPACT_CONTACT_LAW_H

@@ -49,8 +49,7 @@ static void widen(uint8_t *restrict larger, const uint8_t *restrict running, con
     }
 }
 
-/* Count pairs by cell. Neighbouring pairs often fall into one cell: tables in turn keep increments from waiting for
- * each other. */
+/* Count pairs by cell. Neighbouring pairs often fall into one cell: tables in turn let no increment wait. */
 static void count_cells(block_space *s, unsigned stride, size_t table, uint64_t joint[])
 {
     for (int j = 0; j < VI_CORRELATION_BLOCK; ++j) {

@@ -9,8 +9,7 @@
 size_t vi_door_correlation_padding(void);
 size_t vi_door_correlation_tables(void);
 
-/* vi_correlation_add of correlation.h, which adds to `joint`. The lowest radius must lie on the ladder. Returns 0, or 1
- * for a bad argument. */
+/* vi_correlation_add, which adds to `joint`. The lowest radius must be on the ladder. Returns 0; 1: bad argument. */
 int vi_door_correlation_add(const double value[], size_t count, size_t first, size_t last, size_t step, int embedding,
                             double lowest, int radii, uint64_t joint[]);
 

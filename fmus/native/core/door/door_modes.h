@@ -20,9 +20,8 @@ int vi_door_beam_residual(int boundary, int natural, int points, const double po
 int vi_door_beam_residual_shapes(int boundary, int natural, int points, const double point[], int places,
                                  const double s[], double shape[]);
 
-/* Modes of chain_modes.h: stiffness and damping have `masses` + 1 elements, shape is [mass][mode]. Returns 0 where the
- * damping does not couple the modes, -1 for a bad argument. Returns 1 where it couples them; damping_ratio is then that
- * on the diagonal. */
+/* Modes of chain_modes.h: stiffness and damping have `masses` + 1 elements, shape is [mass][mode]. Returns 0, or -1 for
+ * a bad argument, or 1 where the damping couples the modes; damping_ratio is then from the diagonal. */
 int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
                         double natural[], double damping_ratio[], double shape[]);
 

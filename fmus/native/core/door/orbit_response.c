@@ -33,8 +33,7 @@ static bool is_train(const vi_orbit_train *train, int contacts)
     return good && train->phase[train->impacts - 1] - train->phase[0] < TURN * train->periods;
 }
 
-/* The state just after an impulse that recurs once in each train: (1 - Phi(T))^-1 (0, 1), without the cancellations of
- * light damping. */
+/* The state just after an impulse once in each train: (1 - Phi(T))^-1 (0, 1), free of cancellation at light damping. */
 static bool start_of_train(const vi_mode *mode, double length, double start[2])
 {
     double phi[4];

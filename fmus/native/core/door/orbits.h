@@ -17,8 +17,7 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
                           double distance_slope[], double velocity_slope[]);
 
 /* Find the motion of an orbit: modal displacements and velocities after each impact, state[impact][2 modes].
- * monodromy[2 modes][2 modes]: derivative of the state after the first impact over the state a train earlier; NaN where
- * a speed is 0. */
+ * monodromy[2 modes][2 modes]: derivative of the first state over that a train earlier; NaN where a speed is 0. */
 VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train *train, const double velocity[],
                                  double state[], double monodromy[]);
 

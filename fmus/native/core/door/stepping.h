@@ -1,7 +1,6 @@
 /* One body stepped from sample to sample under a held force: the loop over a block of samples.
  *
- * The steps use an instance of the body's FMU with the calls of an importer, so that the samples are the same bit for
- * bit.
+ * The steps use an instance of the body's FMU with the calls of an importer, so the samples are the same bit for bit.
  */
 #ifndef VIBROIMPACT_STEPPING_H
 #define VIBROIMPACT_STEPPING_H

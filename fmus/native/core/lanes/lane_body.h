@@ -13,8 +13,7 @@ typedef struct {
 } vi_lane_meeting;
 
 typedef struct {
-    /* Put the body of a point in the lane, in this state; the lane's clock is set. False where lockstep cannot follow
-     * it. */
+    /* Put the body of a point in the lane, in this state; its clock is set. False if lockstep cannot follow it. */
     bool (*take)(vi_lane_group *group, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points, int64_t point,
                  const double q[], const double p[]);
     /* Search for the first contact up to *share of the present cell; then the lane is moved to the new *share. */

@@ -14,8 +14,7 @@
 
 enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 }; /* cells of a round; order of the Taylor polynomials */
 
-/* Speed of a rebound, relative to the largest approach, below which it may begin the end of a chatter, as in
- * chatter.c. */
+/* Speed of a rebound, relative to the largest approach, below which a chatter may end, as in chatter.c. */
 #define VI_LANE_TAIL 1e-4
 
 /* Parts in which a motion is linear, in the order of the tables. */

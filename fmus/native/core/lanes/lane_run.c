@@ -296,8 +296,7 @@ static bool take_modes(const vi_lanes_work *w, int64_t point)
     return true;
 }
 
-/* Find the start state of a point: its own, or the final state of the last point before it on its branch that has
- * ended. */
+/* Find the start state of a point: its own, or the final state of the last ended point of its branch. */
 static bool take_start(const vi_lanes_work *w, int64_t point, double q[], double p[])
 {
     const vi_lanes_points *points = w->points;

@@ -3,8 +3,7 @@
 #ifndef VIBROIMPACT_LANE_TURN_H
 #define VIBROIMPACT_LANE_TURN_H
 
-/* Cosine and sine: to 1 ulp for 0 <= angle <= 8, to 1.4 ulp up to 100. Results below 1e-7 have errors of 1e-22
- * there. */
+/* Cosine and sine: to 1 ulp for 0 <= angle <= 8, to 1.4 ulp up to 100. Below 1e-7 the error is 1e-22 there. */
 void vi_lane_turn(double angle, double *cosine, double *sine);
 
 /* exp(-x) to 1 ulp, and its loss 1 - exp(-x) to 2 ulp, for x >= 0. */

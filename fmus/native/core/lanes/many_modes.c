@@ -8,8 +8,7 @@
 #include "motion/flow.h"
 #include "motion/majorant.h"
 
-/* Largest steady response, in units of the force's effect within one radian; a larger one would cost as many roundings,
- * so the point is left. */
+/* Largest steady response, in units of the force's effect within one radian; a larger one costs as many roundings. */
 static const double LARGEST_STEADY = 1000.0;
 /* Ratio of the cell lengths of two levels. */
 static const double RATIO = 4.0;

@@ -1,6 +1,5 @@
 /* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the careful search
- * finds. Included by one C file for each instruction set; it defines VI_ROUNDS, the name of the lockstep for all
- * bodies. */
+ * finds. Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
 #include "lanes/rounds.h"
 
 /* Rows of the tables for the present cell lengths of the lanes. */

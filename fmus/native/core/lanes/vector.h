@@ -13,8 +13,7 @@
 typedef double vector __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 typedef int64_t mask __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 
-/* All functions of a round are inlined into one, except under a sanitizer: its checks would then take minutes to
- * compile. */
+/* All functions of a round are inlined into one, except under a sanitizer: its checks take minutes to compile. */
 #if defined(__SANITIZE_ADDRESS__)
 #define LANES_INLINE static inline
 #else

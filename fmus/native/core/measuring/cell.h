@@ -20,8 +20,7 @@
 
 /* Largest number of half sines at once. */
 enum { VI_CELL_PULSES = 2048 };
-/* Largest natural frequency (Hz), damping ratio and contact duration (s): a half sine then takes at most some thousand
- * series. */
+/* Largest natural frequency (Hz), damping ratio and contact duration (s): a half sine takes some thousand series. */
 enum { VI_CELL_HIGHEST = 10000000, VI_CELL_STRONGEST = 1000, VI_CELL_LONGEST = 1000 };
 /* Least natural frequency and contact duration, apart from 0: their squares do not underflow. */
 #define VI_CELL_LEAST 1e-9
@@ -57,8 +56,7 @@ void vi_cell_start(vi_cell *cell, double time, double force);
 /* Advance to `time`, not before the present time, under a force that changes by `slope` N/s. */
 void vi_cell_advance(vi_cell *cell, double time, double slope);
 
-/* Add an impact of this impulse, N s, now; contact_duration must be > 0. False when VI_CELL_PULSES half sines are
- * present. */
+/* Add an impact of this impulse, N s, now; contact_duration must be > 0. False above VI_CELL_PULSES half sines. */
 bool vi_cell_hit(vi_cell *cell, double impulse);
 
 /* Present force on the cell with half sines, N; present output of the cell, V. */

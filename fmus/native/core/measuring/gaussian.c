@@ -36,8 +36,7 @@ static double ratio(const double terms[2][TERMS], double x)
     return above / below;
 }
 
-/* Natural logarithm of a normal number by the series of artanh, since the C library's logarithm differs between
- * machines. */
+/* Natural logarithm of a normal number by the series of artanh, since C libraries differ between machines. */
 static double logarithm(double x)
 {
     int exponent;

@@ -34,8 +34,7 @@ static double turns_of(vi_beam_boundary boundary, int j)
     }
 }
 
-/* One Newton step on the equation for delta in equations.md 6.2, in a form without cosh and sinh, which would
- * overflow. */
+/* One Newton step on the equation for delta in equations.md 6.2, without cosh and sinh, which would overflow. */
 static double newton_step(vi_beam_boundary boundary, int j, double xi, double delta)
 {
     const double square = exp(-2.0 * xi);
@@ -202,8 +201,7 @@ double vi_beam_validity(vi_beam_boundary boundary, int j, double slenderness, do
     return 0.5 * ratio * ratio * (1.0 + e_over_g / shear_coefficient);
 }
 
-/* Gaussian elimination with partial pivoting on the rows a[k][0..n], the right-hand side last; 0 when singular to
- * rounding. */
+/* Gaussian elimination with partial pivoting on rows a[k][0..n], right-hand side last; 0: singular to rounding. */
 static int solve(int n, double a[][VI_MODES + 1], double x[])
 {
     for (int step = 0; step < n; ++step) {

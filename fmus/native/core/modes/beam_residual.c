@@ -84,8 +84,7 @@ static void dropped_mass(const vi_beam_residual *r, double b[VI_PORTS][VI_PORTS]
     }
 }
 
-/* Factor A = L L' in place: the lower triangle becomes L. Returns 0, or the number of a row that depends on earlier
- * rows. */
+/* Factor A = L L' in place: the lower triangle becomes L. Returns 0, or the number of a dependent row. */
 static int factor(int n, double a[VI_PORTS][VI_PORTS])
 {
     for (int k = 0; k < n; ++k) {

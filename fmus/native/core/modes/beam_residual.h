@@ -25,8 +25,8 @@ typedef struct {
 } vi_beam_residual;
 
 /* Find the vectors for `points` different points 0 < s <= 1, none on a support, beside the first `natural` modes.
- * Returns 0, or the number (from 1) of a point too near to an earlier one, some 1e-4 / natural: double precision cannot
- * distinguish their shapes. */
+ * Returns 0, or the number (from 1) of a point that is not distinguishable from an earlier one (some 1e-4 /
+ * natural). */
 int vi_beam_residual_find(vi_beam_residual *residual, vi_beam_boundary boundary, int natural, int points,
                           const double point[]);
 

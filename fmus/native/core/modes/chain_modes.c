@@ -94,8 +94,7 @@ static int find_rigid(const vi_chain *chain, vi_chain_modes *modes)
     return found;
 }
 
-/* Improve the displacement at one end of an element by that at the other end plus the elongation, if this has a smaller
- * error. */
+/* Take the displacement at the other end of an element plus the elongation, if this has a smaller error. */
 static void improve(double *here, double *error, double there, double there_error, double elongation, double blur)
 {
     if (there_error + blur < *error) {

@@ -1,5 +1,4 @@
-/* Modes of a chain: ground - k_1, c_1 - m_1 - k_2, c_2 - m_2 - ... - m_N [- k_{N+1}, c_{N+1} - ground].
- * equations.md 5 */
+/* Modes of a chain: ground - k_1, c_1 - m_1 - k_2, c_2 - m_2 - ... - m_N [- k_N+1, c_N+1 - ground]. equations.md 5 */
 #ifndef VIBROIMPACT_CHAIN_MODES_H
 #define VIBROIMPACT_CHAIN_MODES_H
 
@@ -19,9 +18,9 @@ typedef struct {
  * A mass takes part if sqrt(mass) shape > 1e-8 of the mode's unit length. */
 typedef struct {
     double natural[VI_MODES];            /* angular frequencies, ascending, rad/s */
-    double damping_ratio[VI_MODES];      /* of each mode; from the diagonal where the damping couples the modes */
+    double damping_ratio[VI_MODES];      /* of each mode; where the damping couples the modes, from its diagonal */
     double shape[VI_MODES][VI_MODES];    /* shape[i][j]: displacement of mass i for q_j = 1, kg^(-1/2) */
-    bool classical;                      /* C M^-1 K = K M^-1 C within rounding: damping does not couple the modes */
+    bool classical;                      /* C M^-1 K = K M^-1 C within rounding: damping does not couple modes */
     double damping[VI_MODES][VI_MODES];  /* modal damping matrix, 1/s (complete, also when classical) */
 } vi_chain_modes;
 

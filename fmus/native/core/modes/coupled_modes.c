@@ -3,8 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Part of a held contact's shape that is left by the others, relative to the shape, above which it counts as
- * independent. */
+/* Part of a held contact's shape left by the others, relative to the shape, above which it is independent. */
 static const double INDEPENDENT = 1e-6;
 /* Imaginary part of a rate, relative to the rate, up to which the rate is real. Above REAL and below CRITICAL the rate
  * is nearly critical, and the modes are not used. */
@@ -254,8 +253,7 @@ static void combine(const vi_pressed_body *body, const vi_coupled_work *work, co
     }
 }
 
-/* Displacement of an undamped mode whose state is (natural x, -i rate x), from the larger of the two, which keeps the
- * digits. */
+/* Displacement of an undamped mode whose state is (natural x, -i rate x), from the larger one, for its digits. */
 static vi_complex displacement(const vi_complex state[2], double natural, vi_complex rate)
 {
     if (natural >= vi_complex_size(rate)) {

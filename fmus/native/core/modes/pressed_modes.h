@@ -2,8 +2,7 @@
  *
  * The coupling of the modes has rank one. The rates s are the zeros of 1/Z(s) + sum n_j^2 / (s^2 + D_j s + W_j). Here Z
  * = stiffness + damping s, and 1/Z is 0 for a held point. The vector of a rate is n_j / (s^2 + D_j s + W_j), for a
- * force of -1. Each zero is kept as its distance from a pole: vectors are exact even for points close to a node.
- * equations.md 3.4, 6.9
+ * force of -1. Zeros are kept as distances from poles: vectors are exact even near a node. equations.md 3.4, 6.9
  */
 #ifndef VIBROIMPACT_PRESSED_MODES_H
 #define VIBROIMPACT_PRESSED_MODES_H

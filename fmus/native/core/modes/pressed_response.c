@@ -11,8 +11,7 @@ static vi_complex dynamic_stiffness(const vi_pressed_body *body, vi_complex s, i
     return (vi_complex){detuning + decay * s.re, 2.0 * s.re * s.im + decay * s.im};
 }
 
-/* The mode with the least dynamic stiffness over the square of its part in the point; -1: the point is a node of all
- * modes. */
+/* The mode with the least dynamic stiffness over the square of its part in the point; -1: a node of all modes. */
 static int nearest_resonance(const vi_pressed_body *body, vi_complex s)
 {
     double least = HUGE_VAL;

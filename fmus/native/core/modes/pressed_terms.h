@@ -48,8 +48,7 @@ void vi_pressed_terms_sort(vi_pressed_modes *modes);
 /* Do the vectors give all motions? Two motions decide: one of all displacements and one of all velocities. */
 bool vi_pressed_terms_are_complete(const vi_pressed_modes *modes, const vi_pressed_body *body);
 
-/* Split the motion q(t) = Re sum part_m vector_m e^(rate_m t) that starts at displacement q with velocity p into its
- * parts. */
+/* Split the motion q(t) = Re sum part_m vector_m e^(rate_m t) from displacement q and velocity p into its parts. */
 void vi_pressed_parts(const vi_pressed_modes *modes, const double q[], const double p[], vi_complex part[]);
 
 /* Sum the parts: displacement Re sum part_m vector_m, and velocity with each part times its rate. */

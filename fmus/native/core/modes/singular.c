@@ -67,8 +67,7 @@ static bool pivot(elimination *e, int step)
 }
 
 /* Gaussian elimination with complete pivoting. Without cycles every filled-in entry was 0, so nothing is ever
- * subtracted from a number. Every entry of X, D, Y keeps its relative accuracy, and zeros are exact. Returns the
- * rank. */
+ * subtracted. Every entry of X, D, Y keeps its relative accuracy, and zeros are exact. Returns the rank. */
 static int eliminate(elimination *e)
 {
     int step = 0;
@@ -141,8 +140,7 @@ static void rotate(int n, double cosine, double sine, double x[], double y[])
     }
 }
 
-/* Make two vectors orthogonal, the longer one first, and rotate their left companions alike. Returns whether they were
- * not orthogonal yet. */
+/* Make two vectors orthogonal, the longer one first, and rotate their left companions alike. False: they were. */
 static bool orthogonalise(int columns, int rank, vi_singular *s, int first, int second)
 {
     double *x = s->right[first], *y = s->right[second];

@@ -10,14 +10,14 @@
 enum { VI_ROWS = VI_MODES + VI_PORTS };
 
 typedef struct {
-    int rank;                                /* number of singular values above 0; exact for a matrix without cycles */
-    double value[VI_MODES];                  /* the singular values above 0, ascending */
+    int rank;                                /* number of values above 0; exact for a matrix without cycles */
+    double value[VI_MODES];                  /* values above 0, ascending */
     double left[VI_MODES][VI_ROWS];     /* left[k]: unit vector of value k, one component for each row */
-    double right[VI_MODES][VI_MODES];        /* right[k]: unit vector of value k, one component for each column */
+    double right[VI_MODES][VI_MODES];        /* right[k]: unit vector, one component for each column */
 } vi_singular;
 
-/* Decompose the rows x columns matrix a[row][column], at most VI_ROWS x VI_MODES, which is overwritten. Returns false
- * when an entry is not finite.
+/* Decompose the rows x columns matrix a[row][column], at most VI_ROWS x VI_MODES, which is overwritten. False when an
+ * entry is not finite.
  *
  * A matrix has no cycles if its entries, as edges between rows and columns, form no closed path. The springs and the
  * masses of a chain form none. Then the error of every singular value is a few roundings relative to this value,

@@ -4,8 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Size of an entry, relative to the roots of its two diagonal entries, up to which it is 0: the rounding of a few
- * rotations. */
+/* Size of an entry, relative to the roots of its two diagonal entries, up to which it is 0: a few roundings. */
 static const double NEGLIGIBLE = 8.0 * DBL_EPSILON;
 /* Least size of 1 + tangent^2 of a rotation; below, the plane has only one vector, to half the digits. */
 static const double DEFECTIVE = 1e-8;

@@ -4,8 +4,7 @@
 
 #include "motion/magnitude.h"
 
-/* Range of the first-order amplitude law: least frequency, relative to `natural`, and most added damping ratio. Values
- * beyond are cut. */
+/* Limits of the first-order amplitude law: least frequency, relative to `natural`, and most added damping ratio. */
 static const double LEAST_FREQUENCY = 0.1, MOST_ADDED_RATIO = 1.0;
 
 bool vi_amplitude_acts(const vi_amplitude_law *law)

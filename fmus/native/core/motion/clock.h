@@ -39,8 +39,7 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now);
  * when angular_frequency is 0. Returns false when the period is not a finite positive number of seconds. */
 bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural);
 
-/* Can the clock go on at this angular frequency, rad/s, from `now`? A force with a phase keeps a phase; a constant
- * force has none. */
+/* Can the clock go on at this angular frequency, rad/s, from `now`? A constant force has no phase. */
 bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_instant now);
 
 /* Change the angular frequency to a value that vi_clock_can_retune allows, from *now on. Time, forcing phase and count

@@ -4,12 +4,11 @@
 
 #include "motion/magnitude.h"
 
-/* Largest steady response that is split off, in units of the motion; above, the split loses too many digits and the
- * series form is used. */
+/* Largest steady response that is split off, in units of the motion; above, the split loses too many digits. */
 static const double LARGEST_SPLIT = 8.0;
-/* Length of an overdamped segment, in units of 1 / fastest rate, above which the series form costs too much. Longer
- * segments allow the second ratio for the split: its error, 1e-16 of the steady response, is a time error of 1e-16 of
- * the slow decay time. */
+/* Length of an overdamped segment, in units of 1 / fastest rate, above which a series costs too much. The steady
+ * response may then be LARGEST_SPLIT_OVERDAMPED motions: its error, 1e-16 of it, is a time error of 1e-16 of the slow
+ * decay time. */
 static const double LONGEST_SERIES = 1e4;
 static const double LARGEST_SPLIT_OVERDAMPED = 1e10;
 /* Length of a series segment, in units of 1 / fastest rate; the 21st term is then below 1e-17 of the first. */
@@ -77,8 +76,7 @@ static propagator overdamped(const vi_mode *mode, double slow, double fast, doub
     propagator p = {.slow = slow, .fast = fast};
     p.e_cos = 0.5 * (slow + fast);
     p.e_sin = slow * (lost / (2.0 * mode->rate));
-    /* far from critical damping Ce - decay Se cancels; near critical damping the difference of the exponentials
-     * cancels */
+    /* far from critical damping Ce - decay Se cancels; near it the difference of the exponentials cancels */
     p.back = mode->rate > 0.5 * mode->decay ? (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate)
                                             : p.e_cos - mode->decay * p.e_sin;
     return p;
@@ -262,8 +260,7 @@ static const double FOURTH[VI_SERIES_ORDER + 1] = {0.0,     0.0,     0.0,     0.
                                                    840.0,   1680.0,  3024.0,  5040.0,  7920.0,  11880.0, 17160.0,
                                                    24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
 
-/* Number of modes whose coefficients are found side by side, since each coefficient of one mode waits for the one
- * before. */
+/* Modes whose coefficients are found side by side, since each coefficient of a mode waits for the one before. */
 enum { ABREAST = 8 };
 
 /* Taylor coefficients, indexed by order n, then by mode. */

@@ -58,7 +58,7 @@ typedef struct {
     vi_phase phase;       /* of the force at the start */
     double held, held_rate;
     double length;        /* the segment is valid for 0 <= u <= length, s */
-    double origin;        /* displacements are counted from here, m: 0 when split, else the displacement at the start */
+    double origin;        /* displacements are counted from here, m: 0 when split, else the start's */
     bool series;
     double coefficient[VI_SERIES_ORDER + 1]; /* Taylor, when series */
     double series_snap_bound;
@@ -68,7 +68,7 @@ typedef struct {
     double level, level_rate; /* particular solution of the held input */
     double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
     double slow_part, fast_part; /* amplitudes of the two exponentials when overdamped */
-    double scale;         /* sum of the sizes of a displacement's terms, m; its rounding is 1e-16 of this */
+    double scale;         /* sum of the sizes of a displacement's terms, m; rounding is 1e-16 of it */
 } vi_segment;
 
 /* Prepare a mode; mass > 0, stiffness >= 0, damping >= 0, angular_frequency >= 0 in SI units. */
@@ -95,13 +95,12 @@ void vi_segment_continue(vi_segment *segment, double x, double v, double amplitu
 
 vi_phase vi_phase_of(double angle);
 
-/* Displacement and velocity after `u` >= 0 of the unforced mode: x = phi[0] x0 + phi[1] v0, v = phi[2] x0 + phi[3]
- * v0 */
+/* Displacement and velocity `u` >= 0 s later, unforced: x = phi[0] x0 + phi[1] v0, v = phi[2] x0 + phi[3] v0. */
 void vi_mode_propagator(const vi_mode *mode, double u, double phi[4]);
 
 /* Functions of the time u from which a propagator is built. */
 typedef struct {
-    double slow, fast;   /* exp(-slow u) and exp(-fast u) if overdamped; otherwise both are exp(-decay u) */
+    double slow, fast;   /* exp(-slow u) and exp(-fast u) if overdamped; else both exp(-decay u) */
     double lost;         /* 1 - exp(-2 rate u), if overdamped */
     double cosine, sine; /* of rate u, if underdamped */
 } vi_mode_functions;

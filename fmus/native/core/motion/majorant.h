@@ -25,8 +25,7 @@ typedef struct {
  * new piece. Some tens are usual. */
 enum { VI_MOST_EVALUATIONS = 10000 };
 
-/* A step s, 0 <= s <= horizon, such that the clearance stays >= 0 over [0, s]. s = horizon: no root before the
- * horizon. */
+/* A step s, 0 <= s <= horizon, such that the clearance stays >= 0 over [0, s]. s = horizon: no root before. */
 double vi_certified_step(const vi_approach *approach, double horizon);
 
 /* First root of clearance - velocity s - acceleration s^2/2 for s > 0; HUGE_VAL when there is none. */
@@ -39,8 +38,7 @@ static inline double vi_parabola_root(double clearance, double velocity, double 
     return acceleration > 0.0 ? (sqrt(square) - velocity) / acceleration : HUGE_VAL;
 }
 
-/* Least step of a search for extremes over `length`: this share of the length, doubled every 1024 evaluations so that
- * the search ends. */
+/* Least step of a search for extremes over `length`: this share, doubled every 1024 evaluations to end the search. */
 static inline double vi_least_step(double length, double share, int evaluation)
 {
     return ldexp(share * length, evaluation / 1024);

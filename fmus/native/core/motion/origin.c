@@ -1,7 +1,6 @@
 #include "motion/origin.h"
 
-/* Decay rate times time above which a damped motion gets a new origin. Its bounds are taken at the origin and stay
- * tight below this value. */
+/* Decay rate times time above which a damped motion gets a new origin. Bounds taken at the origin stay tight below. */
 static const double KEPT = 0.1;
 
 static bool goes_on(const vi_origin *origin, const vi_segment *segment, double x, double v)

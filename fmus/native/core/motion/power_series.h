@@ -32,8 +32,7 @@ static inline void vi_power_series_begin(vi_power_series *p, double exponent, do
 }
 
 /* Extend the series by one order, from the next coefficient of the base. Returns the newest known coefficient of power
- * base': the one before the new order. The newest numbers are added last and stored afterwards, so no sum waits for
- * them. */
+ * base': the one before the new order. The newest numbers are added last and stored afterwards: no sum waits. */
 static inline double vi_power_series_extend(vi_power_series *p, double next)
 {
     const int n = ++p->order, width = VI_WHOLE_LANES(n);

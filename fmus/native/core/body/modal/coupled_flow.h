@@ -22,8 +22,7 @@ enum { VI_ROW = VI_WHOLE_LANES(VI_MODES) };
 typedef struct {
     const vi_structure_model *model;
     double length;                              /* valid for 0 <= u <= length, s */
-    int order;                                  /* of the polynomials; VI_ORDER except at the first touch of a power
-                                                 * law */
+    int order;                                  /* of the polynomials; VI_ORDER except at a power law's beginning */
     int rooted;                                 /* the polynomials are in the square root of time: entry_flow.h */
     double modal[VI_ORDER + 1][VI_ROW];         /* modal displacements from the start; modal[0] = 0 */
     double penetration[VI_PORTS][VI_ORDER + 1]; /* d of each contact; [0] is its value at the start */

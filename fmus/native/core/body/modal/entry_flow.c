@@ -6,8 +6,7 @@
 #include "motion/majorant.h"
 #include "motion/power_series.h"
 
-/* Last terms of depth and modes, relative to the tolerance times the first terms; the segment ends where they exceed
- * this. */
+/* Last terms of depth and modes, relative to the tolerance times the first terms, above which the segment ends. */
 static const double SMALLEST_TERM = 0.01;
 
 /* The equation of the modes, with the force of the contact. */
@@ -35,8 +34,7 @@ static double force(entry *at, const double d[], int n)
     return press->stiffness * (at->power.power + press->damping * drag);
 }
 
-/* Coefficient n + 4 of the motion, from coefficient n of its accelerations: in time, (r^n)'' = n (n - 2) r^(n - 4) /
- * 4. */
+/* Coefficient n + 4 of the motion, from coefficient n of the accelerations: (r^n)'' = n (n - 2) r^(n - 4) / 4. */
 static void extend(vi_drift *drift, const entry *at, double drive, int n)
 {
     const vi_structure_model *model = at->model;
@@ -91,8 +89,8 @@ static double share_of_terms(const vi_drift *drift, const double depth[], int n)
     return vi_max(fabs(depth[n]) / depth[2], last / first);
 }
 
-/* The largest r at which the last terms are within the tolerance. Where the contact alone matters, only one of each
- * shift + 2 terms is above 0. */
+/* The largest r at which the last terms are within the tolerance. If the contact alone acts, only each (shift + 2)-th
+ * term is above 0. */
 static double reach(const vi_drift *drift, const entry *at)
 {
     const double *depth = drift->penetration[at->contact], tolerance = SMALLEST_TERM * drift->model->tolerance;

@@ -11,8 +11,7 @@ vi_press vi_structure_stop_press(const vi_structure *s, int k);
 /* Present force law of contact k. */
 vi_press vi_structure_press(const vi_structure *s, int k);
 
-/* Present modal accelerations, and the forces of held and yielding contacts. A negative force of a held contact would
- * have to pull. */
+/* Present modal accelerations, and the forces of held and yielding contacts. Negative holding forces would pull. */
 void vi_structure_accelerate(const vi_structure *s, double acceleration[], double force[]);
 
 /* Modal accelerations without the forces of held contacts. */

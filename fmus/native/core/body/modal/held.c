@@ -65,8 +65,7 @@ static double load_size(const vi_series_noise *noise, int j)
     return size;
 }
 
-/* Rounding of coefficient n - 2 of the force of contact l; a stop that yields turns rounding of the motion into
- * force. */
+/* Rounding of coefficient n - 2 of the force of contact l; a yielding stop turns rounding of the motion into force. */
 static double force_noise(const vi_series_noise *noise, int l)
 {
     const vi_structure *s = noise->s;

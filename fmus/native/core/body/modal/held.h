@@ -7,8 +7,7 @@
 #include "body/modal/coupled_flow.h"
 #include "body/modal/state.h"
 
-/* A contact that would be held at rest from now on: the state after a plastic impact, and the force that would hold
- * it. */
+/* A contact that would be held at rest from now on: the state after a plastic impact, and the force to hold it. */
 typedef struct {
     double p[VI_MODES];
     double mobility;         /* of the contact, with the other held contacts held, 1/kg */

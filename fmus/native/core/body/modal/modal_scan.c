@@ -7,8 +7,7 @@
 
 /* Shortest step between samples, in radians of the fastest rate. */
 static const double SHORTEST_STEP = 0.05;
-/* Rounding of samples, relative to the sum of the sizes of a displacement's terms. Samples cannot resolve contacts with
- * less clearance. */
+/* Rounding of samples, relative to the sum of sizes of a displacement's terms. Less clearance is unresolved. */
 static const double ROUNDING = 1e-12;
 /* Longest level of steps for a single mode: steps beyond .8 radians clear little. */
 enum { LONGEST_OF_ONE = 4 };
@@ -18,8 +17,7 @@ enum { STEEPEST_RISE = 3 };
 enum { MOST_BLOCKS = 4096 };
 enum { MOST_ITERATIONS = 8 };
 static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
-/* Newton step, in intervals between samples, below which a guess is good enough: its error is of the order of the
- * square. */
+/* Newton step, in intervals between samples, below which a guess is good enough: its error is about the square. */
 static const double CLOSE = 3e-4;
 
 /* ---- propagators ---- */
@@ -96,8 +94,7 @@ typedef struct {
     extents extent[VI_PORTS];  /* of the contacts */
 } scanner;
 
-/* Bounds of a mode for a whole flight, from its start: an underdamped mode swings within its amplitude, and no mode's
- * energy grows. */
+/* Bounds of a mode for a whole flight: an underdamped mode stays within its amplitude, and energies never grow. */
 static extent extent_of(const vi_segment *segment)
 {
     const vi_mode *mode = segment->mode;
@@ -257,8 +254,7 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
 /* Verdict on an interval between two samples. */
 typedef enum { CLEARED, HAS_CONTACT, UNDECIDED } verdict;
 
-/* Verdict on an interval that the cubic does not clear: a contact if the body surely comes closer throughout, otherwise
- * undecided. */
+/* Verdict on an interval that the cubic does not clear: a contact if the body surely comes closer throughout. */
 static verdict judge(const samples *at, const opening *o, int i, bool is_off)
 {
     const double first = at->third[i], last = at->third[i + 1];
@@ -272,8 +268,7 @@ static verdict judge(const samples *at, const opening *o, int i, bool is_off)
     return at->clearance[i + 1] > o->ripple ? CLEARED : UNDECIDED;
 }
 
-/* Number of intervals at the beginning of a block that are cleared for one contact; *next: verdict on the next
- * interval. */
+/* Number of first intervals of a block that are cleared for one contact; *next: verdict on the next interval. */
 static int cleared_of(const scanner *s, const vi_scan_level *level, int k, verdict *next)
 {
     samples at;
@@ -300,8 +295,7 @@ static int cleared_of(const scanner *s, const vi_scan_level *level, int k, verdi
     return i;
 }
 
-/* Number of intervals cleared for all contacts. If several contacts are met in one interval, none is known to be the
- * first. */
+/* Number of intervals cleared for all contacts. Of several contacts in one interval none is known to be first. */
 static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, int *contact)
 {
     int least = VI_SCAN_SAMPLES;
@@ -369,8 +363,7 @@ static void advance(scanner *s, const vi_scan_level *level, int steps)
     }
 }
 
-/* Guess of the zero between two samples, from the polynomial of fifth order with the clearances, speeds and
- * accelerations of both. */
+/* Guess of the zero between two samples, by the quintic with the clearances, speeds and accelerations of both. */
 static double guess(const vi_approach *a, const vi_approach *b, double step)
 {
     const double d0 = a->clearance, d1 = -a->velocity * step, d2 = -0.5 * a->acceleration * step * step;

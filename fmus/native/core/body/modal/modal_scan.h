@@ -41,8 +41,7 @@ typedef struct {
     int blocks;       /* number of blocks of samples taken */
 } vi_scan_found;
 
-/* Scan a flight without series from an instant at which the contacts have the approaches `first`. `looked_for[k]`: is
- * contact k watched? */
+/* Scan a flight without series from an instant with the approaches `first`. `looked_for`: watched contacts. */
 vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_point points[], const int looked_for[],
                            const vi_flight_instant *from, const vi_approach first[], vi_scan_found *found);
 

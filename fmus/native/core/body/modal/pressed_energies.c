@@ -2,8 +2,7 @@
 
 #include <math.h>
 
-/* A movement with velocity scale vector e^(rate t): a term, the response to the harmonic force, or the slope of a
- * load's response. */
+/* A movement with velocity scale vector e^(rate t): a term, the harmonic response, or a slope's response. */
 typedef struct {
     vi_complex rate, scale, from, to; /* from, to: e^(rate t) at the start and at the end, times the initial value */
     const vi_complex *vector;

@@ -20,8 +20,7 @@ enum { VI_SEEN_OBSERVED = VI_PORTS, VI_SEEN_FORCE, VI_SEEN = VI_SEEN_FORCE + VI_
 /* State of knowledge of a rest's modes: not found, found for one contact, found for all, or not to be found. */
 typedef enum { VI_MODES_UNKNOWN = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2, VI_MODES_NOT_TOLD = 3 } vi_modes_known;
 
-/* Modes of the body on its present contacts, kept until these change. A cache, no part of the state: its contents
- * follow from the body. */
+/* Cache of the body's modes on its present contacts, no part of the state: its contents follow from the body. */
 struct vi_pressed {
     int32_t known;                 /* vi_modes_known */
     int32_t sought;                /* the modes of all contacts have been searched for */
@@ -54,8 +53,7 @@ typedef struct {
     double force_level[VI_PORTS], force_rate[VI_PORTS];      /* of the pressed contacts, in their order */
 } vi_pressed_flow;
 
-/* Begin at the present state, for at most `length` seconds; false where the response would cost the motion its
- * digits. */
+/* Begin at the present state, for `length` seconds at most; false where the response costs the motion digits. */
 bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, const vi_pressed *pressed, double length);
 
 /* Does the flow, which starts now, continue the rest followed before? Then only the exact flow has moved the body. */
@@ -73,8 +71,7 @@ void vi_pressed_flow_parts(const vi_pressed_flow *flow, double u, vi_complex par
 /* Modal state after u seconds. */
 void vi_pressed_flow_end(const vi_pressed_flow *flow, double u, double q[], double p[]);
 
-/* Integrals over u seconds of a quantity that grows exponentially at `rate` from `start` to `end`, and of a product of
- * two such quantities. */
+/* Integrals over u seconds of a quantity that grows at `rate` from `start` to `end`, and of a product of two such. */
 vi_complex vi_term_integral(vi_complex rate, vi_complex start, vi_complex end, double u);
 vi_complex vi_product_integral(vi_complex rate, vi_complex start, vi_complex end, vi_complex other_rate,
                                vi_complex other_start, vi_complex other_end, double u);

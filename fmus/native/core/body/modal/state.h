@@ -157,8 +157,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
 /* Complain of the place where time stands still, after VI_STEP_STANDSTILL. */
 void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH]);
 
-/* Number (1-based) of a contact that lies beyond its stop by more than rounding, or 0. Such a start state is
- * refused. */
+/* Number (1-based) of a contact beyond its stop by more than rounding, or 0. Such a start is refused. */
 int vi_structure_beyond(const vi_structure *s);
 
 /* Number of modes in use. */
@@ -232,8 +231,7 @@ double vi_structure_within(const vi_structure *s, double displacement);
 double vi_structure_displacement_size(const vi_structure *s, int k);
 double vi_structure_velocity_size(const vi_structure *s, int k);
 
-/* Upper bound of the acceleration of contact k, m/s^2, at lower cost; HUGE_VAL where a stop presses, or an input has a
- * slope. */
+/* Upper bound of contact k's acceleration, m/s^2, at lower cost; HUGE_VAL with a pressing stop or a sloping input. */
 double vi_structure_most_acceleration(const vi_structure *s, int k);
 
 /* Is the largest force of contact k followed? It is only where its impact is recorded. */

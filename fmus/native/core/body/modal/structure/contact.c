@@ -113,8 +113,7 @@ static double pressing_now(const vi_structure *s, int k)
     return vi_press_sense(&press, -vi_structure_clearance(s, k), vi_structure_approach(s, k));
 }
 
-/* A contact that ends at the instant of its beginning, without speed, has only touched. It stays so until something
- * moves. */
+/* A contact that ends as it begins, without speed, has only touched. It stays so until something moves. */
 static bool only_touched(const vi_structure *s, int k)
 {
     if (s->state->leaving[k] != 2) {

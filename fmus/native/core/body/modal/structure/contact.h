@@ -24,8 +24,7 @@ bool vi_structure_is_open(const vi_structure *s, int k);
 void vi_structure_touch_down(const vi_structure *s, int k);
 void vi_structure_separate(const vi_structure *s, int k, bool receding);
 
-/* A receding contact meets its surface. It presses again, or moves out too fast for a force: from now on the surface
- * follows it without force. */
+/* A receding contact meets its surface. It presses again, or moves out too fast: the surface follows without force. */
 void vi_structure_return(const vi_structure *s, int k);
 
 /* A step begins: contacts with other FMUs' stops begin where the applied force is > 0. A start that leaves the stop

@@ -20,8 +20,7 @@ static const double ENTRY = 1e-3;
  * the depth and would not move it. */
 static const double SHALLOW = 32.0;
 
-/* Velocity change over the way out, times the rate, relative to the square of the rate, below which a contact keeps its
- * rate. */
+/* Velocity change over the way out times the rate, relative to the squared rate, below which the rate is kept. */
 static const double COASTS = 1e-2;
 
 /* Does a contact on its way out keep its rate, despite the force that still presses it? */
@@ -112,8 +111,7 @@ static void look_at_powers(const vi_structure *s, vi_situation *now)
     }
 }
 
-/* The one contact that begins to press at this instant, by a power law, while all others are free and off their stops;
- * -1: none. */
+/* The contact that begins to press now, by a power law, while all others are free and off their stops; -1: none. */
 static int entering(const vi_structure *s, const vi_situation *now)
 {
     int found = -1;
@@ -166,8 +164,7 @@ static double energy_now(const vi_structure *s)
     return vi_structure_kinetic(s) + elastic;
 }
 
-/* Finish a segment: add the impulses of thin contacts, and project the held contacts. The energy that this takes is
- * lost to the stops. */
+/* Finish a segment: add impulses of thin contacts, project held contacts. Stops take the lost energy. */
 static void finish(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)
 {
     const bool follow = now->any_thin && s->state->follow_energies;

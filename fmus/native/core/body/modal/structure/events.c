@@ -14,8 +14,7 @@
 /* Distance of a relaxing surface, relative to the displacements, below which the surface is at rest. */
 static const double RELAXED = 1e-16;
 
-/* Press of a receding contact, in roundings, up to which its return is searched for. Above, the contact was thrown back
- * and returns at once. */
+/* Press of a receding contact, in roundings, up to which its return is searched. Above, it returns at once. */
 static const double THROWN = 1e4;
 
 /* Take the result of a search: an event, or none up to fall->time. */
@@ -61,8 +60,7 @@ bool vi_structure_stays(const vi_structure *s, const vi_drift *drift, int k, con
     return moved <= VI_ROUNDING * terms;
 }
 
-/* Divide a series that is 0 at the start, but for rounding, by time to the power `first`. It keeps its zeros, except
- * the zero at the start. */
+/* Divide a series that starts at 0, within rounding, by time to the power `first`. It keeps all other zeros. */
 static void divide(double c[VI_ORDER + 1], int first)
 {
     for (int n = 0; n <= VI_ORDER; ++n) {
@@ -130,8 +128,7 @@ static void arrivals(const vi_structure *s, const vi_drift *drift, const vi_situ
     consider(first, &fall, VI_DRIFT_ARRIVAL, k);
 }
 
-/* First fall of the force of held contact k through zero, thin contacts included. Without thin contacts the force falls
- * at `alone`. */
+/* First fall of held contact k's force through zero, thin contacts included. Without them it falls at `alone`. */
 static vi_fall release_beside_thin(const vi_structure *s, const vi_drift *drift, const vi_situation *now, int k,
                                    vi_fall alone, double length, double noise)
 {
@@ -176,8 +173,7 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
     consider(first, &fall, VI_DRIFT_RELEASE, k);
 }
 
-/* Rounding of the number with the sign of a compliant contact's force: the force itself or, for a power law, 1 +
- * damping d'. */
+/* Rounding of a number with the sign of a compliant force: the force itself or, for a power law, 1 + damping d'. */
 static double pressing_noise(const vi_structure *s, int k)
 {
     const vi_press press = vi_structure_stop_press(s, k);
@@ -260,8 +256,8 @@ static void separations(const vi_structure *s, const vi_drift *drift, const vi_s
     }
 }
 
-/* Distance that is 0 when a receding contact presses again: minus its force or, for a lagging surface, the distance to
- * the surface. */
+/* Distance that reaches 0 when a receding contact presses again: minus its force, or the distance to a lagging
+ * surface. */
 static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, double gap[VI_ORDER + 1])
 {
     const vi_contact *contact = &s->contacts[k];
@@ -320,8 +316,7 @@ vi_event_found vi_structure_first_event(const vi_structure *s, const vi_drift *d
     length = vi_drift_variable(drift, length);
     searched = vi_drift_variable(drift, searched);
     vi_event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1, length};
-    /* compliant stops first: at one instant their events precede others, so that a stop that would pull no longer acts
-     * on others */
+    /* compliant stops first: at one instant their events precede others, so a stop that would pull does not act */
     for (int turn = 0; turn < 2 * s->model->contacts; ++turn) {
         const int k = turn % s->model->contacts;
         const bool compliant = s->state->status[k] >= VI_CONTACT_YIELDING;

@@ -15,8 +15,7 @@
 #include "body/modal/structure/settle.h"
 #include "body/step.h"
 
-/* Offset of an indicator's change of sign, in roundings: a contact that has just left or met its stop does not signal
- * again. */
+/* Offset of an indicator's change of sign, in roundings: a contact that just left or met its stop signals only once. */
 static const double INDICATED = 16.0;
 /* Most checks of the contacts at one instant; in a corner each check may set off others. */
 enum { MOST_LOOKS = 2 * VI_PORTS };

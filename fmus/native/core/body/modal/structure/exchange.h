@@ -18,8 +18,7 @@ typedef struct {
     vi_structure parts;
     int modes, contacts;  /* of the description; those beyond the body's own stand still */
     double scale;         /* modal displacement for a state of 1 m, kg^(1/2); used when the states are modal */
-    /* when the states are those of masses: displacements of the masses for modal ones, and the masses; otherwise
-     * NULL */
+    /* for states of masses: displacements of the masses for modal ones, and the masses; otherwise NULL */
     const double (*shape)[VI_MODES];
     const double *mass;
     const char *refused;  /* the component's own parameters that cannot be integrated, or NULL */
@@ -27,8 +26,8 @@ typedef struct {
 
 void vi_exchange_enable(const vi_exchange_body *body);
 
-/* After the start: set nominal values. Returns false with the reasons when contacts or the record ask for results that
- * an integrator cannot give. */
+/* After the start: set nominal values. False, with reasons, when contacts or the record need more than an
+ * integrator. */
 bool vi_exchange_begin(const vi_exchange_body *body, char message[VI_MESSAGE_LENGTH]);
 
 bool vi_exchange_set_time(const vi_exchange_body *body, double time);

@@ -48,8 +48,7 @@ static double climb(const vi_flight *flight, const vi_point *point, double u, do
     }
 }
 
-/* Find the largest displacement * sign over the flight; regions that stay below the largest value so far are
- * skipped. */
+/* Find the largest displacement * sign over the flight; regions below the largest value so far are skipped. */
 static void extreme(const vi_structure *s, const vi_flight *flight, double sign, double end)
 {
     vi_flight_instant now;

@@ -21,8 +21,7 @@ void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const
 
 /* ---- largest forces of contacts that yield ---- */
 
-/* Largest forces of the contacts whose impacts are recorded, over the first u seconds of a drift. Thin contacts have no
- * force there. */
+/* Largest forces of recorded contacts over the first u seconds of a drift. Thin contacts have no force there. */
 void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u);
 
 /* ---- extremes of the observed point ---- */

@@ -17,8 +17,7 @@
  * stops that leave no room the rounds would never end. */
 static const int MOST_ROUNDS = 64;
 
-/* Height of a bounce, relative to the motion, that any integrator can follow; unresolved heights are cut to this
- * value. */
+/* Height of a bounce, relative to the motion, that any integrator follows; unresolved heights are cut to it. */
 static const double HIGHEST_UNRESOLVED = 1e-4;
 
 static double restitution_of(const vi_structure *s, int k, double approach)
@@ -54,8 +53,7 @@ static double bounce_resolution(const vi_structure *s, int k, double pressure, d
     return vi_max(integrated, resolution(s, k, pressure, rebound));
 }
 
-/* Apply the plastic impact that replaces the rest of a chatter sequence, or ends the motion on a stop without
- * rebound. */
+/* Apply the plastic impact that replaces the rest of a chatter sequence, or acts on a stop without rebound. */
 static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view, double delay, double tail_impulse)
 {
     const double before = s->state->follow_energies ? vi_structure_kinetic(s) : 0.0;
@@ -93,8 +91,7 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
     }
 }
 
-/* Speed at which contact k leaves after the impulses: the rebound of its law, or more where others have thrown it
- * off. */
+/* Speed at which contact k leaves after the impulses: its law's rebound, or more where others have thrown it off. */
 static double rebound_of(const vi_structure *s, int k, double approach, double impulse, double restitution)
 {
     const double own = restitution * approach, speed = -vi_structure_approach(s, k);
@@ -152,8 +149,7 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
     }
 }
 
-/* Add the impulses to the modes, rounded once: parts below a rounding of the impulse still decide the rounding of a
- * velocity. */
+/* Add the impulses to the modes, rounded once: parts below its rounding still decide the rounding of a velocity. */
 static void give_impulses(const vi_structure *s, const double impulse[], const double low[])
 {
     for (int k = 0; k < s->model->contacts; ++k) {

@@ -16,8 +16,7 @@ enum { PATIENCE = 16, PATIENCE_HELD = 4 };
 /* Least certified step, in radians of the fastest rate, that repays an evaluation of all terms. LEAST_REST: least
  * length of a rest; times the number of modes where the modes must be found anew. */
 static const double LEAST_STEP = 8.0, LEAST_REST = 32.0;
-/* Least length of a rest, in radians times the square of the number of modes, for modes of several contacts or of
- * coupled damping. */
+/* Least length of a rest, in radians times modes^2, for modes of several contacts or of coupled damping. */
 static const double ALL_MODES = 2.0;
 /* Distance from zero, in roundings of the terms, below which a guarded quantity is left to the series. */
 static const double MARGIN = 16.0;
@@ -64,8 +63,7 @@ static double pays(const vi_structure *s)
     return s->model->varies ? LEAST_REST * (double)vi_structure_modes(s->model) : LEAST_REST;
 }
 
-/* Does finding the modes of several contacts, or of coupled damping, pay too? Segments already followed by series count
- * as radians. */
+/* Does finding modes of several contacts, or of coupled damping, pay too? Segments by series count as radians. */
 static bool pays_for_all(const vi_structure *s, double radians)
 {
     const double modes = (double)vi_structure_modes(s->model), spent = s->model->varies ? 0.0 : (double)s->state->series;
@@ -98,8 +96,7 @@ static void start_guard(const vi_structure *s, const vi_pressed_flow *flow, doub
     }
 }
 
-/* Time up to which the contact surely stays pressed and no other begins, at most the length. Steps below `least` end
- * it. */
+/* Time in which the contact surely stays pressed and no other begins, at most the length. Steps < `least` end it. */
 static double certain(const vi_structure *s, const vi_pressed_flow *flow, const guard *g, double length, double least)
 {
     vi_complex part[VI_TERMS];

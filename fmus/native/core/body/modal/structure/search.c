@@ -9,8 +9,7 @@
 
 /* Longest last step to a contact, in radians of the fastest rate. */
 static const double LAST_STEP = 1e-5;
-/* Distance of a contact from the evaluated instant, in radians of the fastest rate, up to which its third power is a
- * rounding. */
+/* Time from an evaluated instant to a contact, in radians of the fastest rate, whose third power is a rounding. */
 static const double NEAR = 6e-6;
 /* Evaluations between two scans after a scan without result. */
 enum { PATIENCE = 4 };

@@ -157,8 +157,7 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
     move(s, u, VI_ENDS_AT_TARGET, target);
 }
 
-/* Fly to the next contact, the end of the segment, or the target, whichever comes first; false when the motion exceeds
- * the largest numbers. */
+/* Fly to the next contact, the segment's end, or the target, whichever is first; false when numbers overflow. */
 static bool fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     vi_ending end;
@@ -246,8 +245,7 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     case VI_DRIFT_ARRIVAL:
         vi_structure_meet(s, k, stops_here(s, target, request));
         break;
-    /* a sudden change of load lifts the contact off with an acceleration, unless others hold its point; otherwise its
-     * force has fallen to 0 */
+    /* a sudden load lifts the contact off with an acceleration, unless others hold it; otherwise its force is 0 */
     case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 || vi_structure_is_kept(s, k) ? 2 : 1); break;
     case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
     case VI_DRIFT_RETURN:

@@ -6,8 +6,7 @@
 #include "body/modal/state.h"
 #include "body/step.h"
 
-/* Begin at an instant, after q, p and the contacts' parameters have been set. Clears the rest of the state except
- * `held`. */
+/* Begin at an instant, after q, p and the contacts' parameters are set. Clears the other state except `held`. */
 void vi_structure_start(const vi_structure *s, vi_instant now);
 
 /* Advance to `target`; step.h lists the reasons for an earlier end. */

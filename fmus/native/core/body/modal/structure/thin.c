@@ -105,8 +105,7 @@ void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, do
     double moment;
     const double whole = strength * integrate(press.exponent, depth, rate, u, &moment);
     const double stopping = vi_max(0.0, vi_structure_approach(s, k)) / s->model->compliance[k][k];
-    /* at most the impulse that stops the contact: a larger one, found only below the rounding of its displacement,
-     * would throw it back */
+    /* at most the impulse that stops the contact: a larger one, below the displacement's rounding, throws it back */
     const double impulse = rate > 0.0 ? vi_min(whole, stopping) : whole;
     vi_structure_push(s, k, impulse, s->state->p);
     vi_structure_push(s, k, impulse < whole ? strength * moment * (impulse / whole) : strength * moment, s->state->q);
