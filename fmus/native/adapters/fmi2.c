@@ -38,7 +38,7 @@ static void log_message(const vi_instance *instance, int level, const char *cate
     }
 }
 
-/* ---- life ---- */
+/* ---- instances ---- */
 
 const char *fmi2GetTypesPlatform(void)
 {

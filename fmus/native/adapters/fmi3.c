@@ -26,7 +26,7 @@ static void log_message(const vi_instance *instance, int level, const char *cate
     }
 }
 
-/* ---- life ---- */
+/* ---- instances ---- */
 
 const char *fmi3GetVersion(void)
 {

@@ -18,7 +18,7 @@ static const vi_description *const description = &vi_this_description;
 /* Most states of a body: a displacement and a velocity of each mode. */
 enum { MOST_STATES = 2 * VI_MODES };
 
-/* ---- life ---- */
+/* ---- instances ---- */
 
 bool vi_token_fits(const char *token)
 {

@@ -16,7 +16,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-enum { VI_MOST_SIZES = 8, VI_BLOCK_LENGTH = 16, VI_PATH_LENGTH = 4096 }; /* sizes; characters with their end */
+enum { VI_MOST_SIZES = 8, VI_BLOCK_LENGTH = 16, VI_PATH_LENGTH = 4096 }; /* most sizes; longest texts */
 
 typedef struct {
     int count;

@@ -434,7 +434,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     return parameters_are_good(self, message) && fill_model(self, message);
 }
 
-/* ---- life ---- */
+/* ---- loads and outputs ---- */
 
 static void find_forcing(const void *self, double force[VI_MODES])
 {

@@ -43,7 +43,7 @@ typedef struct {
     double root_mass;                    /* sqrt(mass of the beam), kg^(1/2) */
     double forced_shape[VI_MODES];       /* of forcing_location, kg^(-1/2) */
     double participation[VI_MODES];      /* modal force of a unit acceleration of the base, kg^(1/2) */
-    int32_t depends_on_amplitude;        /* does any mode? */
+    int32_t depends_on_amplitude;        /* does a mode depend on its amplitude? */
     /* outputs */
     double modal_displacement[VI_MODES], modal_velocity[VI_MODES], modal_acceleration[VI_MODES];
     beam_sensor sensor[BEAM_SENSORS];

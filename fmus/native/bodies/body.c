@@ -10,7 +10,7 @@
 
 static const vi_body_form *const form = &vi_this_body;
 
-static const double DEFAULT_TOLERANCE = 1e-10; /* of contact_tolerance */
+static const double DEFAULT_TOLERANCE = 1e-10; /* default contact_tolerance */
 
 vi_body *vi_body_of(void *self)
 {

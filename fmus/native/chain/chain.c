@@ -190,7 +190,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
-/* ---- life ---- */
+/* ---- loads and outputs ---- */
 
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {

@@ -110,7 +110,7 @@ static void follow_amplitude(void *self)
     vi_structure_prepare(&o->body.model);
 }
 
-/* ---- life ---- */
+/* ---- loads and outputs ---- */
 
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {

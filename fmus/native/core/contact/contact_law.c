@@ -86,7 +86,7 @@ const vi_law vi_laws[VI_MOST_LAWS] = {
            .external = true},
 };
 
-/* ---- what is asked of it ---- */
+/* ---- queries ---- */
 
 bool vi_contact_law_exists(int64_t law)
 {

@@ -71,7 +71,7 @@ typedef struct {
     vi_coupling_calls save, restore; /* empty without saved states */
     vi_coupling_calls event_times;  /* FMI 2.0: one read, if it reports its first event */
     int32_t event_mode, may_return_early;
-    int32_t number; /* names its events */
+    int32_t number; /* its number in `events` */
     double internal_step; /* s */
     double only_step;     /* its only step size, s; 0: any size */
     /* Arguments and results of its step, in the memory of the importer's instance. `flags` are those of FMI 3.0: needs

@@ -72,7 +72,7 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
 /* Apply a flight of `u` seconds to a change of the state. */
 void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES]);
 
-/* Steady response at the contact of impact i, distance beyond its stop, and the first two derivatives. */
+/* Steady response at the contact of impact i: distance beyond its stop, and the first two derivatives. */
 void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3]);
 
 #endif

@@ -12,7 +12,7 @@
 
 #include "lanes/lane_points.h"
 
-enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 }; /* cells of a round; order of the Taylor polynomials */
+enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 }; /* VI_CELLS: of a round; VI_LANE_ORDER: of the Taylor series */
 
 /* Speed of a rebound, relative to the largest approach, below which a chatter may end, as in chatter.c. */
 #define VI_LANE_TAIL 1e-4

@@ -20,7 +20,8 @@
 
 /* Largest number of half sines at once. */
 enum { VI_CELL_PULSES = 2048 };
-/* Largest natural frequency (Hz), damping ratio and contact duration (s): a half sine takes some thousand series. */
+/* Largest natural frequency (Hz), damping ratio and contact duration (s); a half sine then needs some thousand
+ * series at most. */
 enum { VI_CELL_HIGHEST = 10000000, VI_CELL_STRONGEST = 1000, VI_CELL_LONGEST = 1000 };
 /* Least natural frequency and contact duration, apart from 0: their squares do not underflow. */
 #define VI_CELL_LEAST 1e-9

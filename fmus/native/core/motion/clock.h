@@ -29,7 +29,8 @@ typedef struct {
     int64_t events;
 } vi_standstill;
 
-/* Number of events at one instant above which time counts as standing still; eight contacts need some tens at most. */
+/* Number of events at one instant from which on time counts as standing still; eight contacts need some tens at
+ * most. */
 enum { VI_MOST_EVENTS = 1000 };
 
 /* Count an event at `now`; true once VI_MOST_EVENTS in a row have left the time unchanged. */
@@ -39,7 +40,7 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now);
  * when angular_frequency is 0. Returns false when the period is not a finite positive number of seconds. */
 bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural);
 
-/* Can the clock go on at this angular frequency, rad/s, from `now`? A constant force has no phase. */
+/* Can the clock go on at this angular frequency, rad/s, from `now`? It must be 0 if and only if it was 0. */
 bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_instant now);
 
 /* Change the angular frequency to a value that vi_clock_can_retune allows, from *now on. Time, forcing phase and count

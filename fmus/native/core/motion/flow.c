@@ -390,7 +390,7 @@ void vi_segment_part(const vi_segment *s, double u, vi_part *part)
     }
 }
 
-/* ---- the door ---- */
+/* ---- segments ---- */
 
 vi_phase vi_phase_of(double angle)
 {

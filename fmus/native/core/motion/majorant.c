@@ -6,8 +6,8 @@ static const double THIRD = 1.0 / 3.0, TWELFTH = 1.0 / 12.0;
 /* Ratio of limit to certified step above which bisection gains little; the limit is then lowered first. */
 static const double FAR = 64.0;
 
-/* Acceleration of a parabola above the quartic's approach up to s. The quartic's own acceleration is at most a + j s/3
- * + bound s^2/12, which is convex in s: its largest value is at an end. */
+/* Acceleration of a parabola that approaches at least as fast as the quartic up to s. The quartic's coefficient of
+ * t^2/2 is a + j t/3 + bound t^2/12, which is convex in t: its largest value is at an end. */
 static inline double acceleration_up_to(const vi_approach *p, double s)
 {
     return p->acceleration + vi_max(0.0, s * (p->jerk * THIRD + s * (p->bound * TWELFTH)));

@@ -34,7 +34,8 @@ static double force(entry *at, const double d[], int n)
     return press->stiffness * (at->power.power + press->damping * drag);
 }
 
-/* Coefficient n + 4 of the motion, from coefficient n of the accelerations: (r^n)'' = n (n - 2) r^(n - 4) / 4. */
+/* Coefficient n + 4 of the motion, from coefficient n of the accelerations: (r^n)'' = n (n - 2) r^(n - 4) / 4 in
+ * time. */
 static void extend(vi_drift *drift, const entry *at, double drive, int n)
 {
     const vi_structure_model *model = at->model;

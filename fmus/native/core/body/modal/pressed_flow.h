@@ -17,7 +17,7 @@
 /* Observed quantities: displacements of the contacts and of the observed point, and forces of the contacts. */
 enum { VI_SEEN_OBSERVED = VI_PORTS, VI_SEEN_FORCE, VI_SEEN = VI_SEEN_FORCE + VI_PORTS };
 
-/* State of knowledge of a rest's modes: not found, found for one contact, found for all, or not to be found. */
+/* Knowledge of a rest's modes: not searched yet, found for one contact, found for all contacts, or not found. */
 typedef enum { VI_MODES_UNKNOWN = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2, VI_MODES_NOT_TOLD = 3 } vi_modes_known;
 
 /* Cache of the body's modes on its present contacts, no part of the state: its contents follow from the body. */
