@@ -271,18 +271,18 @@ static void every_clock_ticks_at_its_instants(uint64_t *seed)
     const vi_coupling_plan plan = plan_of(count);
     vi_coupling_progress progress = from_zero(macro_step);
     vi_coupling_run run = run_to(end, macro_step);
-    const int came_to = vi_door_coupling(&plan, &progress, &run);
-    CHECK(came_to == VI_COUPLING_DONE && progress.time == end, "%d at %g", came_to, progress.time);
-    int64_t told = 0;
+    const int result = vi_door_coupling(&plan, &progress, &run);
+    CHECK(result == VI_COUPLING_DONE && progress.time == end, "%d at %g", result, progress.time);
+    int64_t ticks = 0;
     for (int i = 0; i < count; ++i) {
         const clock_state *s = &clocks[i].state;
         CHECK(s->ticks == (int64_t)floor(end / s->period) && s->time == end, "%d ticks of %g", (int)s->ticks,
               s->period);
         CHECK(i == 0 || s->input == end, "%g", s->input);
-        told += s->ticks;
+        ticks += s->ticks;
     }
-    CHECK(told == run.events_used, "%d told, %d ticks", (int)run.events_used, (int)told);
-    for (int64_t k = 1; k < told; ++k) {
+    CHECK(ticks == run.events_used, "%d events, %d ticks", (int)run.events_used, (int)ticks);
+    for (int64_t k = 1; k < ticks; ++k) {
         const bool is_same = events[k][0] == events[k - 1][0];
         CHECK(events[k][0] >= events[k - 1][0] && events[k][1] == (is_same ? events[k - 1][1] + 1.0 : 0.0), "%g",
               events[k][0]);
@@ -298,9 +298,9 @@ static void events_without_room_are_left_to_the_caller(uint64_t *seed)
     vi_coupling_progress progress = from_zero(INFINITY);
     vi_coupling_run run = run_to(20.0, INFINITY);
     run.events_room = choice(seed, 7);
-    const int came_to = vi_door_coupling(&plan, &progress, &run);
+    const int result = vi_door_coupling(&plan, &progress, &run);
     const double left = 0.5 * (double)(run.events_room + 1);
-    CHECK(came_to == VI_COUPLING_REACHED && run.arrived == 1 && run.reached == left, "%d at %g", came_to, run.reached);
+    CHECK(result == VI_COUPLING_REACHED && run.arrived == 1 && run.reached == left, "%d at %g", result, run.reached);
     CHECK(run.events_used == run.events_room && progress.time == left - 0.5, "%g", progress.time);
 }
 
@@ -315,12 +315,12 @@ static void a_component_of_one_step_size_is_given_no_other(uint64_t *seed)
     const vi_coupling_plan plan = plan_of(2);
     vi_coupling_progress progress = from_zero(step);
     vi_coupling_run run = run_to(0.1, step);
-    const int came_to = vi_door_coupling(&plan, &progress, &run);
+    const int result = vi_door_coupling(&plan, &progress, &run);
     if (clocks[0].state.period == period) {
-        CHECK(came_to == VI_COUPLING_CUT && run.at == 1, "%d at %d", came_to, run.at);
+        CHECK(result == VI_COUPLING_CUT && run.at == 1, "%d at %d", result, run.at);
         CHECK(clocks[1].state.time < period && run.goal == period, "%g of %g", run.goal, period);
     } else {
-        CHECK(came_to == VI_COUPLING_DONE && clocks[1].step_size == step, "%d, %.17g", came_to, clocks[1].step_size);
+        CHECK(result == VI_COUPLING_DONE && clocks[1].step_size == step, "%d, %.17g", result, clocks[1].step_size);
     }
 }
 
@@ -337,10 +337,10 @@ static void liars_end_the_loop_and_never_hold_it(uint64_t *seed)
     run.hears_pauses = (int32_t)choice(seed, 2);
     double before = 0.0;
     for (int call = 0; call < 20; ++call) {
-        const int came_to = vi_door_coupling(&plan, &progress, &run);
-        CHECK(came_to >= VI_COUPLING_DONE && came_to <= VI_COUPLING_ENDLESS, "%d", came_to); /* all take any size */
+        const int result = vi_door_coupling(&plan, &progress, &run);
+        CHECK(result >= VI_COUPLING_DONE && result <= VI_COUPLING_ENDLESS, "%d", result); /* all take any size */
         CHECK(progress.time >= before && progress.time <= run.end, "%g after %g", progress.time, before);
-        CHECK(came_to != VI_COUPLING_FAILED || run.status < 0 || run.status > 1, "%d", run.status);
+        CHECK(result != VI_COUPLING_FAILED || run.status < 0 || run.status > 1, "%d", run.status);
         CHECK(run.arrived <= count && run.events_used <= EVENTS, "%d", run.arrived);
         before = progress.time;
         run.events_used = 0;

@@ -22,7 +22,7 @@ typedef struct {
 
 /* Result for the remaining bounces. */
 typedef struct {
-    bool rests;       /* the body sticks now: the bounces are summed, or cannot be followed */
+    bool sticks;      /* the body sticks now: the bounces are summed, or cannot be followed */
     bool summed;
     double duration;  /* of the summed bounces, s */
 } vi_chatter;

@@ -24,7 +24,7 @@ typedef struct {
     /* outputs */
     double displacement_max, displacement_min; /* m */
     int64_t count, dropped;
-    int64_t told; /* the importer has been told that the record is full, and has not emptied it since */
+    int64_t reported; /* the importer knows that the record is full, and has not emptied it since */
     /* the open period */
     int32_t open;       /* extremes are being followed */
     int32_t period_open;

@@ -85,11 +85,11 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
                      double p[VI_PORTS])
 {
     int index[VI_PORTS], count = 0;
-    double largest = 0.0, wanted[VI_PORTS], found[VI_PORTS];
+    double largest = 0.0, load[VI_PORTS], found[VI_PORTS];
     for (int k = 0; k < n; ++k) {
         p[k] = 0.0;
         if (active[k]) {
-            wanted[count] = b[k];
+            load[count] = b[k];
             index[count++] = k;
             largest = fmax(largest, fabs(g[k][k]));
         }
@@ -97,8 +97,8 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
     if (count == 0 || !(largest > 0.0)) {
         return;
     }
-    if (!solve(count, g, index, wanted, 0.0, REDUNDANT * largest, found)) {
-        share(count, g, index, wanted, largest, found);
+    if (!solve(count, g, index, load, 0.0, REDUNDANT * largest, found)) {
+        share(count, g, index, load, largest, found);
     }
     for (int i = 0; i < count; ++i) {
         p[index[i]] = found[i];

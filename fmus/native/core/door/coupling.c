@@ -64,20 +64,20 @@ static int make_all(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_c
 
 static int save_all(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int came_to = GO_ON;
-    for (int32_t i = 0; i < plan->count && came_to == GO_ON; ++i) {
-        came_to = make_all(plan, r, &plan->components[i].save);
+    int result = GO_ON;
+    for (int32_t i = 0; i < plan->count && result == GO_ON; ++i) {
+        result = make_all(plan, r, &plan->components[i].save);
     }
-    return came_to;
+    return result;
 }
 
 static int restore_all(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int came_to = GO_ON;
-    for (int32_t i = 0; i < plan->count && came_to == GO_ON; ++i) {
-        came_to = make_all(plan, r, &plan->components[i].restore);
+    int result = GO_ON;
+    for (int32_t i = 0; i < plan->count && result == GO_ON; ++i) {
+        result = make_all(plan, r, &plan->components[i].restore);
     }
-    return came_to;
+    return result;
 }
 
 /* ---- the step of one component ---- */
@@ -166,11 +166,11 @@ static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i,
     }
     if (c->step.kind == VI_CALL_STEP2) {
         c->time = *c->step_time + *c->step_size;
-        const int came_to = make_all(plan, r, &c->event_times);
-        if (came_to == GO_ON && c->event_times.count > 0) {
+        const int result = make_all(plan, r, &c->event_times);
+        if (result == GO_ON && c->event_times.count > 0) {
             *reached = reported(plan, c, r, has_event);
         }
-        return came_to;
+        return result;
     }
     if (c->flags[1] != 0 || !take_end(plan, c)) {
         return VI_COUPLING_STEPPED;
@@ -192,12 +192,12 @@ static int step_all(const vi_coupling_plan *plan, vi_coupling_run *r, bool may_r
     for (int32_t i = 0; i < plan->count; ++i) {
         double reached;
         bool has_event;
-        int came_to = make_all(plan, r, &plan->components[i].inputs);
-        if (came_to == GO_ON) {
-            came_to = step_one(plan, r, i, &reached, &has_event);
+        int result = make_all(plan, r, &plan->components[i].inputs);
+        if (result == GO_ON) {
+            result = step_one(plan, r, i, &reached, &has_event);
         }
-        if (came_to != GO_ON) {
-            return came_to;
+        if (result != GO_ON) {
+            return result;
         }
         if (reached < r->goal) {
             const bool ends_it = i == 0 && reached > r->start && plan->components[i].event_mode;
@@ -223,15 +223,15 @@ static int step_together(const vi_coupling_plan *plan, vi_coupling_progress *p, 
 {
     r->goal = r->target;
     for (int k = 0; k < MOST_REPETITIONS; ++k) {
-        int came_to = step_all(plan, r, plan->saves && k + 1 < MOST_REPETITIONS);
-        if (came_to != OVERTAKEN) {
-            return came_to;
+        int result = step_all(plan, r, plan->saves && k + 1 < MOST_REPETITIONS);
+        if (result != OVERTAKEN) {
+            return result;
         }
         p->repeated_steps += 1;
         r->goal = r->reached;
-        came_to = restore_all(plan, r);
-        if (came_to != GO_ON) {
-            return came_to;
+        result = restore_all(plan, r);
+        if (result != GO_ON) {
+            return result;
         }
     }
     return VI_COUPLING_STEPPED;
@@ -252,17 +252,17 @@ static bool any_decision(const vi_coupling_plan *plan, int which)
 /* Carry values and update discrete states until all components are settled. */
 static int resolve(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int came_to = make_all(plan, r, &plan->begin);
-    for (int32_t k = 1; came_to == GO_ON && any_decision(plan, 0); ++k) {
-        came_to = make_all(plan, r, &plan->again);
-        if (came_to == GO_ON && k == plan->most_iterations) {
+    int result = make_all(plan, r, &plan->begin);
+    for (int32_t k = 1; result == GO_ON && any_decision(plan, 0); ++k) {
+        result = make_all(plan, r, &plan->again);
+        if (result == GO_ON && k == plan->most_iterations) {
             return VI_COUPLING_ENDLESS;
         }
     }
-    if (came_to == GO_ON && any_decision(plan, 1)) {
+    if (result == GO_ON && any_decision(plan, 1)) {
         r->wants_to_end = 1;
     }
-    return came_to == GO_ON ? make_all(plan, r, &plan->leave) : came_to;
+    return result == GO_ON ? make_all(plan, r, &plan->leave) : result;
 }
 
 static void note(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
@@ -303,14 +303,14 @@ static int step(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupli
 {
     r->start = p->time;
     r->target = p->next_point < r->end ? p->next_point : r->end;
-    int came_to = make_all(plan, r, &plan->start);
-    if (came_to == GO_ON && plan->saves) {
-        came_to = save_all(plan, r);
+    int result = make_all(plan, r, &plan->start);
+    if (result == GO_ON && plan->saves) {
+        result = save_all(plan, r);
     }
-    if (came_to == GO_ON) {
-        came_to = step_together(plan, p, r);
+    if (result == GO_ON) {
+        result = step_together(plan, p, r);
     }
-    return came_to == GO_ON ? finish(plan, p, r) : came_to;
+    return result == GO_ON ? finish(plan, p, r) : result;
 }
 
 /* Find the next communication point: the next multiple of the macro step. */
@@ -338,9 +338,9 @@ VI_DOOR int vi_door_coupling(const vi_coupling_plan *plan, vi_coupling_progress 
         if (progress->next_point - time <= room && !pass_point(run, progress, room)) {
             return VI_COUPLING_LISTEN;
         }
-        const int came_to = step(plan, progress, run);
-        if (came_to != GO_ON) {
-            return came_to;
+        const int result = step(plan, progress, run);
+        if (result != GO_ON) {
+            return result;
         }
         if (vi_seconds_since(call) >= run->most_seconds) {
             return VI_COUPLING_LISTEN;

@@ -117,15 +117,15 @@ static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_point
         if (p->rows_room - p->rows_used < plan->row_capacity) {
             return VI_RUNS_FULL;
         }
-        int came_to = step(f, p, end);
-        if (came_to == GO_ON && p->time < end) {
-            came_to = take_rows(f, plan, p);
-            if (came_to == GO_ON && vi_seconds_since(call) >= p->most_seconds) {
-                came_to = VI_RUNS_LISTEN;
+        int result = step(f, p, end);
+        if (result == GO_ON && p->time < end) {
+            result = take_rows(f, plan, p);
+            if (result == GO_ON && vi_seconds_since(call) >= p->most_seconds) {
+                result = VI_RUNS_LISTEN;
             }
         }
-        if (came_to != GO_ON) {
-            return came_to;
+        if (result != GO_ON) {
+            return result;
         }
     }
     return GO_ON;
@@ -133,9 +133,9 @@ static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_point
 
 static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
 {
-    const int came_to = take_rows(f, plan, p);
-    if (came_to != GO_ON) {
-        return came_to;
+    const int result = take_rows(f, plan, p);
+    if (result != GO_ON) {
+        return result;
     }
     double *finals = p->finals + (size_t)p->at * plan->finals.count;
     bool *flags = p->flags + (size_t)p->at * plan->flags.count;
@@ -158,29 +158,29 @@ static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points
 /* Run the present point to its end. */
 static int go_on(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double call)
 {
-    int came_to = GO_ON;
+    int result = GO_ON;
     if (p->stage == NOT_BEGUN) {
         p->outcome[p->at] = VI_RUN_ENDED;
         p->give_up = 0;
-        came_to = begin(f, plan, p);
+        result = begin(f, plan, p);
     }
-    if (came_to == GO_ON && p->stage == BEFORE_RECORDING) {
-        came_to = advance(f, plan, p, p->begin[p->at], call);
-        if (came_to == GO_ON) {
+    if (result == GO_ON && p->stage == BEFORE_RECORDING) {
+        result = advance(f, plan, p, p->begin[p->at], call);
+        if (result == GO_ON) {
             const bool good = went_well(f->set_boolean(f->instance, plan->switches.references, plan->switches.count,
                                                        plan->switch_values, plan->switches.count));
-            came_to = good ? GO_ON : VI_RUNS_REFUSED;
+            result = good ? GO_ON : VI_RUNS_REFUSED;
             p->stage = RECORDING;
         }
     }
-    if (came_to == GO_ON && p->stage == RECORDING) {
-        came_to = advance(f, plan, p, p->end[p->at], call);
+    if (result == GO_ON && p->stage == RECORDING) {
+        result = advance(f, plan, p, p->end[p->at], call);
     }
-    if (came_to == GO_ON || came_to == RUN_ENDS) {
+    if (result == GO_ON || result == RUN_ENDS) {
         p->stage = AT_END;
-        came_to = finish(f, plan, p);
+        result = finish(f, plan, p);
     }
-    return came_to;
+    return result;
 }
 
 VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_runs_points *points)
@@ -188,12 +188,12 @@ VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_ru
     const double call = vi_seconds_now();
     double since = call;
     while (points->at < points->count) {
-        const int came_to = go_on(fmu, plan, points, call);
+        const int result = go_on(fmu, plan, points, call);
         const double now = vi_seconds_now();
         points->spent += now > since ? now - since : 0.0;
         since = now;
-        if (came_to != GO_ON) {
-            return came_to;
+        if (result != GO_ON) {
+            return result;
         }
         points->seconds[points->at] = points->spent;
         points->at += 1;

@@ -95,16 +95,16 @@ VI_DOOR int vi_door_hold(const vi_runs_fmu *fmu, const vi_hold_plan *plan, vi_ho
 {
     const double call = vi_seconds_now();
     while (block->at < block->count) {
-        int came_to = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
-        if (came_to == VI_HOLD_DONE) {
+        int result = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
+        if (result == VI_HOLD_DONE) {
             block->begun = 1;
-            came_to = advance(fmu, plan, block);
+            result = advance(fmu, plan, block);
         }
-        if (came_to == VI_HOLD_DONE) {
-            came_to = read_sample(fmu, plan, block);
+        if (result == VI_HOLD_DONE) {
+            result = read_sample(fmu, plan, block);
         }
-        if (came_to != VI_HOLD_DONE) {
-            return came_to;
+        if (result != VI_HOLD_DONE) {
+            return result;
         }
         block->begun = 0;
         block->at += 1;

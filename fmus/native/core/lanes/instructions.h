@@ -4,11 +4,11 @@
 
 #include "lanes/lane_group.h"
 
-/* The instruction set that runs when `wanted` is asked for: itself, or the best; 0 where the machine lacks it. */
-int vi_lanes_instructions(int wanted);
+/* The instruction set that runs when `set` is asked for: itself, or the best; 0 where the machine lacks it. */
+int vi_lanes_instructions(int set);
 
 /* The rounds compiled for an instruction set; NULL where the machine lacks it. */
-vi_lanes_rounds vi_lanes_rounds_of(int wanted);
+vi_lanes_rounds vi_lanes_rounds_of(int set);
 
 void vi_lanes_rounds_baseline(vi_lane_group *group, int modes, int contacts);
 void vi_lanes_rounds_avx2(vi_lane_group *group, int modes, int contacts);

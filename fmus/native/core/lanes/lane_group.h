@@ -81,7 +81,7 @@ typedef struct {
     vi_lane_array goal_periods, goal_rest, goal_rest_low;
     vi_lane_array on;                         /* number of the contact just left, from 1; 0: none */
     vi_lane_array fastest_impact, impacts;
-    vi_lane_array tells, follows;             /* 1: each impact is an event; extremes are followed */
+    vi_lane_array reports, follows;           /* 1: each impact is an event; extremes are followed */
     /* the last round: its start, whole cells passed and the share of one more */
     vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
     vi_lane_array passed, share;

@@ -142,7 +142,7 @@ static void arrive(vi_lanes_work *w, int lane)
     }
     if (!run->recording) {
         run->recording = true;
-        g->tells[lane] = w->plan->impacts ? 1.0 : 0.0;
+        g->reports[lane] = w->plan->impacts ? 1.0 : 0.0;
         g->follows[lane] = w->plan->periods && w->plan->extrema ? 1.0 : 0.0;
         run->highest = run->lowest = displacement;
         if (w->plan->periods && g->rest[lane] == 0.0) {
@@ -185,8 +185,8 @@ static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
     g->on[lane] = g->hit[lane] = c + 1.0;
     g->approach[lane] = met->approach;
     g->impacts[lane] += 1.0;
-    const bool tells = g->tells[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
-    return tells ? VI_EVENT_IMPACT : VI_EVENT_NONE;
+    const bool reports = g->reports[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
+    return reports ? VI_EVENT_IMPACT : VI_EVENT_NONE;
 }
 
 /* Search the cell that lockstep could not decide. Returns the resulting event. */
@@ -340,7 +340,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     run->point = point;
     run->recording = run->goal_is_period = run->period_open = false;
     w->points->rows_of[point] = 0;
-    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = g->tells[lane] = g->follows[lane] = 0.0;
+    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = g->reports[lane] = g->follows[lane] = 0.0;
     g->most_impacts[lane] = w->plan->impact_limit > 0 ? (double)w->plan->impact_limit : HUGE_VAL;
     if (!take_start(w, point, q, p) || !take_modes(w, point) || !take_time(w, lane, point)
         || !w->body->take(g, lane, w->plan, w->points, point, q, p)) {

@@ -34,7 +34,7 @@ VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan);
  * points afterwards; their arrays may move between calls. Returns one of VI_LANES_DONE to VI_LANES_REFUSED. */
 VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, void *memory);
 
-/* The instruction set that runs when `wanted` is asked for: itself, or the best; 0 where the machine lacks it. */
-VI_DOOR int vi_door_lanes_instructions(int wanted);
+/* The instruction set that runs when `set` is asked for: itself, or the best; 0 where the machine lacks it. */
+VI_DOOR int vi_door_lanes_instructions(int set);
 
 #endif

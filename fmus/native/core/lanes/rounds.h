@@ -354,7 +354,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
     const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
     const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
-    const mask tells = (load(g->tells + at) > 0.0) | (impacts >= load(g->most_impacts + at));
+    const mask reports = (load(g->reports + at) > 0.0) | (impacts >= load(g->most_impacts + at));
     store(g->start_q[0] + at, s.q);
     store(g->start_p[0] + at, s.p);
     store(g->start_cosine + at, s.cosine);
@@ -367,7 +367,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
     vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(a.hits & tells, all((double)VI_EVENT_IMPACT), event);
+    event = choose(a.hits & reports, all((double)VI_EVENT_IMPACT), event);
     event = choose(arrives, all((double)VI_EVENT_GOAL), event);
     event = choose(a.careful, all((double)VI_EVENT_CELL), event);
     event = choose(leaves, all((double)VI_EVENT_LEAVE), event);

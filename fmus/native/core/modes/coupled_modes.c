@@ -304,7 +304,7 @@ static bool add_terms(vi_pressed_modes *found, const vi_pressed_body *body, cons
     const int states = 2 * work->real.rank;
     vi_complex rate[VI_STATES];
     bool taken[VI_STATES] = {false};
-    int told = 0;
+    int covered = 0;
     for (int k = 0; k < states; ++k) {
         rate[k] = rate_of(work, work->vector[k]);
         const double size = vi_complex_size(rate[k]);
@@ -315,13 +315,13 @@ static bool add_terms(vi_pressed_modes *found, const vi_pressed_body *body, cons
             return false;
         }
         taken[k] = rate[k].im < 0.0;
-        told += rate[k].im > 0.0 ? 2 : rate[k].im == 0.0 ? 1 : 0;
+        covered += rate[k].im > 0.0 ? 2 : rate[k].im == 0.0 ? 1 : 0;
     }
     for (int k = slowest(states, rate, taken); k >= 0; k = slowest(states, rate, taken)) {
         taken[k] = true;
         add_term(found, body, work, rate[k], work->vector[k]);
     }
-    return told == states;
+    return covered == states;
 }
 
 bool vi_coupled_modes_find(vi_pressed_modes *found, const vi_pressed_body *body, vi_coupled_work *work)

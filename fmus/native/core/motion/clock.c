@@ -110,12 +110,12 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant)
 
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
 {
-    const double rests = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests);
+    const double difference = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, difference);
     if (a.periods == b.periods) {
-        return rests + low;
+        return difference + low;
     }
     const double count = (double)(b.periods - a.periods), whole = count * clock->period;
-    return (whole + rests) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
+    return (whole + difference) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
 }
 
 bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
@@ -131,8 +131,9 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
 double vi_clock_elapsed_twofold(const vi_clock *clock, vi_instant a, vi_instant b, double *low)
 {
     const double count = (double)(b.periods - a.periods), whole = count * clock->period;
-    const double rests = b.rest - a.rest, sum = whole + rests;
-    double rounding = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests) + sum_error(whole, rests, sum);
+    const double difference = b.rest - a.rest, sum = whole + difference;
+    double rounding = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, difference)
+                      + sum_error(whole, difference, sum);
     rounding += count * clock->period_low + fma(count, clock->period, -whole);
     const double high = sum + rounding;
     *low = rounding - (high - sum);

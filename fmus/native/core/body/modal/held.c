@@ -8,7 +8,7 @@
 #include "contact/complementarity.h"
 
 /* Remaining mobility, relative to a contact's own, below which other held contacts keep its point in place. */
-static const double KEPT = 1e-9;
+static const double LEAST_MOBILITY = 1e-9;
 
 void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
 {
@@ -177,12 +177,12 @@ double vi_structure_mobility_left(const vi_structure *s, int k)
     for (int l = 0; l < s->model->contacts; ++l) {
         left -= g[k][l] * share[l];
     }
-    return vi_max(left, KEPT * g[k][k]);
+    return vi_max(left, LEAST_MOBILITY * g[k][k]);
 }
 
 bool vi_structure_is_kept(const vi_structure *s, int k)
 {
-    return others_hold(s, k) && vi_structure_mobility_left(s, k) <= KEPT * s->model->compliance[k][k];
+    return others_hold(s, k) && vi_structure_mobility_left(s, k) <= LEAST_MOBILITY * s->model->compliance[k][k];
 }
 
 bool vi_structure_only_touches(const vi_structure *s, int k)

@@ -91,9 +91,9 @@ static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model,
 {
     const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
     bool same = pressed->known != VI_MODES_UNKNOWN && pressed->contacts == model->contacts
-                && same_body(&pressed->asked, &pressed->body)
+                && same_body(&pressed->present, &pressed->body)
                 && memcmp(pressed->observed, model->observed, size) == 0;
-    for (int i = 0; i < pressed->asked.contacts && same; ++i) {
+    for (int i = 0; i < pressed->present.contacts && same; ++i) {
         same = pressed->port[i] == port[i];
     }
     for (int l = 0; l < model->contacts && same; ++l) {
@@ -128,11 +128,11 @@ static void weigh_all(vi_pressed *pressed, const vi_structure_model *model)
 
 static void begin(vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
 {
-    pressed->known = VI_MODES_NOT_TOLD;
-    pressed->sought = 0;
+    pressed->known = VI_MODES_NOT_FOUND;
+    pressed->searched = 0;
     pressed->still.known = pressed->harmonic.known = 0;
     pressed->contacts = model->contacts;
-    pressed->body = pressed->asked;
+    pressed->body = pressed->present;
     memcpy(pressed->port, port, sizeof pressed->port);
     memcpy(pressed->shape, model->shape, sizeof pressed->shape);
     memcpy(pressed->observed, model->observed, sizeof pressed->observed);
@@ -148,20 +148,20 @@ const vi_pressed *vi_pressed_find(const vi_structure *s, bool all)
     vi_pressed *pressed = s->pressed;
     int32_t port[VI_PORTS] = {0};
     const int contacts = vi_pressed_contacts(s, port);
-    describe(s, port, contacts, &pressed->asked);
+    describe(s, port, contacts, &pressed->present);
     if (!rests_as(pressed, s->model, port)) {
         begin(pressed, s->model, port);
     }
-    if (pressed->known == VI_MODES_NOT_TOLD && all && !pressed->sought) {
-        pressed->sought = 1;
+    if (pressed->known == VI_MODES_NOT_FOUND && all && !pressed->searched) {
+        pressed->searched = 1;
         if (vi_coupled_modes_find(&pressed->modes, &pressed->body, &pressed->work)) {
             pressed->known = VI_MODES_OF_ALL;
             vi_coupled_equations_find(&pressed->still, &pressed->body, (vi_complex){0.0, 0.0});
             weigh_all(pressed, s->model);
         }
     }
-    const bool told = pressed->known == VI_MODES_OF_ONE || (all && pressed->known == VI_MODES_OF_ALL);
-    return told ? pressed : NULL;
+    const bool is_known = pressed->known == VI_MODES_OF_ONE || (all && pressed->known == VI_MODES_OF_ALL);
+    return is_known ? pressed : NULL;
 }
 
 /* ---- the flow ---- */

@@ -18,15 +18,15 @@
 enum { VI_SEEN_OBSERVED = VI_PORTS, VI_SEEN_FORCE, VI_SEEN = VI_SEEN_FORCE + VI_PORTS };
 
 /* Knowledge of a rest's modes: not searched yet, found for one contact, found for all contacts, or not found. */
-typedef enum { VI_MODES_UNKNOWN = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2, VI_MODES_NOT_TOLD = 3 } vi_modes_known;
+typedef enum { VI_MODES_UNKNOWN = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2, VI_MODES_NOT_FOUND = 3 } vi_modes_known;
 
 /* Cache of the body's modes on its present contacts, no part of the state: its contents follow from the body. */
 struct vi_pressed {
     int32_t known;                 /* vi_modes_known */
-    int32_t sought;                /* the modes of all contacts have been searched for */
+    int32_t searched;              /* the modes of all contacts have been searched for */
     int32_t contacts;              /* of the body */
     int32_t port[VI_PORTS];        /* contact of the body, for each pressed contact */
-    vi_pressed_body body, asked;   /* asked: the body on its present contacts */
+    vi_pressed_body body, present; /* present: the body on its present contacts */
     double shape[VI_PORTS][VI_MODES], observed[VI_MODES];
     vi_pressed_modes modes;
     vi_complex weight[VI_SEEN][VI_TERMS]; /* of each term in the observed quantities */

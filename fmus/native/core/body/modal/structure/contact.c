@@ -12,8 +12,8 @@
 /* Clearance, in roundings of the displacement, below which contacts meet at the same instant. */
 static const double SAME_INSTANT = 16.0;
 /* Penetration, in roundings, above which a contact recedes after its force has ended; below, it ends with its
- * penetration. GONE: value of 1 + damping d' up to which the force of a power law counts as ended. */
-static const double WITH_IT = 4.0, GONE = 1e-9;
+ * penetration. ENDED: value of 1 + damping d' up to which the force of a power law counts as ended. */
+static const double RECEDES = 4.0, ENDED = 1e-9;
 
 /* ---- sticking and release ---- */
 
@@ -41,7 +41,7 @@ static bool is_rest(const vi_structure *s, int k)
 }
 
 /* List the contacts that touch only because contact k holds their point. */
-static void those_held_by(const vi_structure *s, int k, int touching[])
+static void find_held_by(const vi_structure *s, int k, int touching[])
 {
     const int32_t status = s->state->status[k];
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -62,7 +62,7 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
     if (!contact->earlier && is_rest(s, k)) {
         vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
     }
-    those_held_by(s, k, touching);
+    find_held_by(s, k, touching);
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = leaving;
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -162,7 +162,7 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     state->separated[k] = state->now;
     const bool linear = vi_structure_stop_press(s, k).kind == VI_PRESS_LINEAR;
     /* the force ends before the penetration, or with it */
-    if (receding && (linear ? penetration > WITH_IT * noise : pressing_now(s, k) <= GONE && penetration > noise)) {
+    if (receding && (linear ? penetration > RECEDES * noise : pressing_now(s, k) <= ENDED && penetration > noise)) {
         state->status[k] = VI_CONTACT_RECEDING;
     } else {
         /* after an impact elsewhere it may be off its stop, and on its way back */
@@ -213,8 +213,8 @@ void vi_structure_begin_recording(const vi_structure *s)
     s->record->period_impacts = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const bool yields = s->state->status[k] == VI_CONTACT_YIELDING, before = s->state->moved != 0;
-        const bool rests = s->state->status[k] == VI_CONTACT_HELD && s->contacts[k].stick_start <= now;
-        s->contacts[k].earlier = before && (yields || rests);
+        const bool sticks = s->state->status[k] == VI_CONTACT_HELD && s->contacts[k].stick_start <= now;
+        s->contacts[k].earlier = before && (yields || sticks);
         s->state->touch_down[k].counted = before;
         if (yields && !before && s->state->touch_down[k].velocity > 0.0) {
             count_once(s, k); /* pressed in by the start state */

@@ -15,7 +15,7 @@
 static const double RELAXED = 1e-16;
 
 /* Press of a receding contact, in roundings, up to which its return is searched. Above, it returns at once. */
-static const double THROWN = 1e4;
+static const double MOST_PRESS = 1e4;
 
 /* Take the result of a search: an event, or none up to fall->time. */
 static void consider(vi_event_found *first, const vi_fall *fall, vi_drift_event event, int contact)
@@ -291,7 +291,7 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         vi_fall fall = {true, 0.0, 1.0};
         const bool lags = vi_structure_surface_lags(s, k);
         /* otherwise an impact elsewhere has thrown the point back */
-        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : pressing_noise(s, k))) {
+        if (gap[0] >= -MOST_PRESS * vi_max(small, lags ? noise : pressing_noise(s, k))) {
             fall = vi_polynomial_fall(gap, 0.0, length, small);
         }
         consider(first, &fall, VI_DRIFT_RETURN, k);

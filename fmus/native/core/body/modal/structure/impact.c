@@ -23,8 +23,8 @@ static const double HIGHEST_UNRESOLVED = 1e-4;
 static double restitution_of(const vi_structure *s, int k, double approach)
 {
     const vi_contact *contact = &s->contacts[k];
-    const bool asked = s->model->asks && vi_contact_law_is_external(contact->law.law);
-    return asked ? contact->applied_restitution : vi_contact_law_restitution(&contact->law, approach);
+    const bool is_answered = s->model->asks && vi_contact_law_is_external(contact->law.law);
+    return is_answered ? contact->applied_restitution : vi_contact_law_restitution(&contact->law, approach);
 }
 
 static double drag_at(const vi_structure *s, int k)
@@ -85,7 +85,7 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
                           .resolution = bounce_resolution(s, k, view.pressure, rebound),
                           .tiny = tiny};
     const vi_chatter chatter = vi_chatter_look(&b, s->state->low_impacts[k]);
-    if (chatter.rests) {
+    if (chatter.sticks) {
         const double impulse = (1.0 + restitution) * rebound / (view.mobility * (1.0 - restitution));
         come_to_rest(s, k, &view, chatter.duration, chatter.summed ? impulse : 0.0);
     }
@@ -183,15 +183,15 @@ static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_
 }
 
 /* The impulse of a contact that is alone in play. */
-static void own_impulse(const vi_structure *s, int k, double wanted, double *impulse, double *impulse_low)
+static void own_impulse(const vi_structure *s, int k, double change, double *impulse, double *impulse_low)
 {
-    const double g = s->model->mobility[k][k], p = wanted / g;
+    const double g = s->model->mobility[k][k], p = change / g;
     *impulse = p;
-    *impulse_low = (fma(-g, p, wanted) - s->model->mobility_low[k][k] * p) / g;
+    *impulse_low = (fma(-g, p, change) - s->model->mobility_low[k][k] * p) / g;
 }
 
 /* Solve for the impulses of the contacts in play; all others are left out. */
-static void joint_impulses(const vi_structure *s, const int in_play[], const double wanted[], double impulse[],
+static void joint_impulses(const vi_structure *s, const int in_play[], const double change[], double impulse[],
                            double impulse_low[])
 {
     double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
@@ -205,13 +205,13 @@ static void joint_impulses(const vi_structure *s, const int in_play[], const dou
     }
     if (count == 1 && s->model->mobility[index[0]][index[0]] > 0.0) {
         const int k = index[0];
-        own_impulse(s, k, wanted[k], &impulse[k], &impulse_low[k]);
+        own_impulse(s, k, change[k], &impulse[k], &impulse_low[k]);
         return;
     }
     vi_structure_signed(s, s->model->mobility, whole);
     vi_structure_signed(s, s->model->mobility_low, whole_low);
     for (int i = 0; i < count; ++i) {
-        b[i] = wanted[index[i]];
+        b[i] = change[index[i]];
         for (int j = 0; j < count; ++j) {
             g[i][j] = whole[index[i]][index[j]];
             low[i][j] = whole_low[index[i]][index[j]];
@@ -230,7 +230,7 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, wanted[VI_PORTS] = {0.0};
+    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, change[VI_PORTS] = {0.0};
     double impulse[VI_PORTS], impulse_low[VI_PORTS];
     int in_play[VI_PORTS] = {0};
     const double before = vi_structure_kinetic(s);
@@ -241,10 +241,10 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
         if (hit[k]) {
             approach[k] = vi_max(0.0, vi_structure_approach(s, k));
             restitution[k] = restitution_of(s, k, approach[k]);
-            wanted[k] = (1.0 + restitution[k]) * approach[k];
+            change[k] = (1.0 + restitution[k]) * approach[k];
         }
     }
-    joint_impulses(s, in_play, wanted, impulse, impulse_low);
+    joint_impulses(s, in_play, change, impulse, impulse_low);
     give_impulses(s, impulse, impulse_low);
     state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
     for (int k = 0; k < n; ++k) {

@@ -189,16 +189,16 @@ static bool scan_on(const vi_structure *s, const vi_flight *flight, const vi_poi
                     const vi_approach approach[], vi_search_found *found, vi_search_end *end)
 {
     vi_scan_found bracket;
-    const vi_scan_end came_to = vi_scan_flight(s->scan, flight, points, looked_for, &found->now, approach, &bracket);
+    const vi_scan_end result = vi_scan_flight(s->scan, flight, points, looked_for, &found->now, approach, &bracket);
     vi_budget_spend(&s->state->budget, (int64_t)bracket.blocks * vi_structure_modes(s->model));
     *end = VI_SEARCH_NOTHING;
-    found->u = came_to == VI_SCAN_CLEAR ? flight->length : bracket.low;
-    if (came_to == VI_SCAN_BRACKET && close_in(s, flight, &points[bracket.contact], &bracket, found)) {
+    found->u = result == VI_SCAN_CLEAR ? flight->length : bracket.low;
+    if (result == VI_SCAN_BRACKET && close_in(s, flight, &points[bracket.contact], &bracket, found)) {
         *end = found->u < flight->length ? VI_SEARCH_CONTACT : VI_SEARCH_NOTHING;
         found->u = vi_min(found->u, flight->length);
         return true;
     }
-    return came_to == VI_SCAN_CLEAR;
+    return result == VI_SCAN_CLEAR;
 }
 
 vi_search_end vi_search_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[],
@@ -207,7 +207,7 @@ vi_search_end vi_search_flight(const vi_structure *s, const vi_flight *flight, c
     vi_approach approach[VI_PORTS];
     int looked_for[VI_PORTS];
     const bool scans = s->scan != NULL && !flight->series && !s->model->varies && s->model->fastest > 0.0;
-    int rests = 0; /* evaluations left before the next scan */
+    int pause = 0; /* evaluations left before the next scan */
     for (int k = 0; k < s->model->contacts; ++k) {
         looked_for[k] = vi_structure_watched(s, k);
     }
@@ -220,9 +220,9 @@ vi_search_end vi_search_flight(const vi_structure *s, const vi_flight *flight, c
         if (!look(s, flight, points, looked_for, &found->now, approach)) {
             return VI_SEARCH_BEYOND;
         }
-        if (scans && rests-- == 0) {
+        if (scans && pause-- == 0) {
             const double before = found->u;
-            rests = PATIENCE;
+            pause = PATIENCE;
             if (scan_on(s, flight, points, looked_for, approach, found, &end)) {
                 return end;
             }

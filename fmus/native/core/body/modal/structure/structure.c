@@ -180,11 +180,11 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
         return true;
     }
     found.u = flight.length;
-    const vi_search_end came_to = idle ? VI_SEARCH_NOTHING : vi_search_flight(s, &flight, points, &found);
-    if (came_to == VI_SEARCH_BEYOND) {
+    const vi_search_end search_result = idle ? VI_SEARCH_NOTHING : vi_search_flight(s, &flight, points, &found);
+    if (search_result == VI_SEARCH_BEYOND) {
         return false;
     }
-    const bool meets = came_to == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
+    const bool meets = search_result == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
         vi_extremes_of_flight(s, &flight, u);

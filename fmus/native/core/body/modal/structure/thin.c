@@ -8,7 +8,7 @@
 #include "motion/majorant.h"
 
 /* Relative change of a depth below which the depth hardly changes and quadrature replaces differences of powers. */
-static const double SLOW = 0.1;
+static const double SMALL_CHANGE = 0.1;
 
 /* Upper bound of the rate at which the other forces change the modal accelerations, m/s^3 kg^(1/2). A projection on
  * held stops makes it no longer. */
@@ -81,12 +81,12 @@ double vi_thin_time(const vi_structure *s, int k, double rate, const double acce
 static double integrate(double n, double depth, double rate, double u, double *moment)
 {
     static const double NODES[] = {0.1127016653792583, 0.5, 0.8872983346207417}, WEIGHTS[] = {5.0, 8.0, 5.0};
-    const double after = vi_max(0.0, depth + rate * u), begun = pow(vi_max(0.0, depth), n + 1.0);
+    const double after = vi_max(0.0, depth + rate * u), start = pow(vi_max(0.0, depth), n + 1.0);
     double sum = 0.0;
     *moment = 0.0;
-    if (fabs(rate * u) >= SLOW * fabs(depth) && fabs(rate) > DBL_MIN / DBL_EPSILON) {
-        sum = (pow(after, n + 1.0) - begun) / ((n + 1.0) * rate);
-        *moment = ((pow(after, n + 2.0) - begun * vi_max(0.0, depth)) / ((n + 2.0) * rate) - begun * u)
+    if (fabs(rate * u) >= SMALL_CHANGE * fabs(depth) && fabs(rate) > DBL_MIN / DBL_EPSILON) {
+        sum = (pow(after, n + 1.0) - start) / ((n + 1.0) * rate);
+        *moment = ((pow(after, n + 2.0) - start * vi_max(0.0, depth)) / ((n + 2.0) * rate) - start * u)
                   / ((n + 1.0) * rate);
         return sum;
     }
