@@ -1,4 +1,4 @@
-"""Operation `fmu build`: the components of the package, compiled for this machine."""
+"""Operation `fmu build`: compile the components of the package for this machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments that operations of several packages have, worded once."""
+"""Arguments that operations of several packages share."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 from vibroimpact.fmus.operations.declaring import Option
 
-#: Help of the option of all commands that read FMUs of other tools.
+#: Help text of the option of all commands that read FMUs of other tools.
 STRICT = "Refuse FMUs that may run wrong, instead of saying so."
 Force = Annotated[
     bool,
