@@ -1,4 +1,4 @@
-"""Arguments that operations of the service's client share, worded once."""
+"""Arguments that operations of the service's client share."""
 
 from __future__ import annotations
 

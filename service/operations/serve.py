@@ -1,4 +1,4 @@
-"""Operation `serve`: the service, on one folder and one port."""
+"""Operation `serve`: run the service on one folder and one port."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.service.operations.packages import ServiceOperation
 
 @operation("service.serving:serve")
 class Serve(ServiceOperation):
-    """Run the service: campaigns over HTTP, one after the other, resumed after anything.
+    """Run the service: campaigns over HTTP, one after the other, resumed after any interruption.
 
     Example: vibroimpact serve --data service --port 8737
     """

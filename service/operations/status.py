@@ -1,4 +1,4 @@
-"""Operation `status`: where the campaigns of a service are."""
+"""Operation `status`: show the states of a service's campaigns."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.service.operations.packages import ServiceOperation
 
 @operation("service.commands.asking:show_status")
 class Status(ServiceOperation):
-    """Say where the campaigns of a service are.
+    """Show the states of a service's campaigns.
 
     Example: vibroimpact status --data service
     """

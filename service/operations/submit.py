@@ -1,4 +1,4 @@
-"""Operation `submit`: a scene becomes a campaign of a service."""
+"""Operation `submit`: submit a scene as a campaign of a service."""
 
 from __future__ import annotations
 

@@ -25,12 +25,12 @@ from vibroimpact.service.store import ENDED, Asked, Kind, State, Store
 from vibroimpact.service.supervisor import Supervisor
 
 MOST_WORKERS = 256
-"""Processes that one campaign may ask for."""
+"""Largest number of processes for one campaign."""
 Reference = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Submission(BaseModel):
-    """A scene to be run."""
+    """A scene to run."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -50,7 +50,7 @@ class Submission(BaseModel):
 
 
 class JobPage(BaseModel):
-    """Jobs, the newest first, and where the next page begins."""
+    """Jobs, the newest first, and the start of the next page."""
 
     items: list[JobAnswer]
     next: int | None
@@ -67,7 +67,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         summary="Submit a scene",
     )
     def submit(given: Submission, response: Response, idempotency_key: IdempotencyKey = None) -> JobAnswer:
-        """Accept a scene, which is run after those before it. The same `Idempotency-Key` again is the same job."""
+        """Accept a scene, to run after those before it. The same `Idempotency-Key` again gives the same job."""
         try:
             taken = taken_scene(given.scene, shelf, given.recordings)
             asked = _asked(given, taken, shelf)
@@ -90,7 +90,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         "/campaigns/{name}", responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY)
     )
     def status(name: str) -> JobAnswer:
-        """Say where a campaign is."""
+        """Return the state of a campaign."""
         return job_answer(known_job(store, name))
 
     @router.post(
@@ -99,7 +99,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
     )
     def cancel(name: str) -> JobAnswer:
-        """End a campaign that waits or runs; what it has computed stays, and can be resumed."""
+        """Cancel a waiting or running campaign; its results so far stay, and it can be resumed."""
         job = known_job(store, name)
         if not supervisor.cancel(name) and known_job(store, name).state in ENDED:
             raise ProblemError(
@@ -114,7 +114,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
     )
     def resume(name: str) -> JobAnswer:
-        """Go on with a campaign that was cancelled or has failed, from what is there."""
+        """Resume a cancelled or failed campaign from its results so far."""
         job = known_job(store, name)
         again = {"state": State.queued, "message": "", "ended": None, "attempts": 0}
         if not store.change(name, only_from=[State.cancelled, State.failed], **again):
@@ -130,7 +130,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
     )
     def delete(name: str) -> None:
-        """Forget a campaign that has ended, with its folder."""
+        """Delete a campaign that has ended, with its folder."""
         job = known_job(store, name)
         if not store.delete(name):
             raise ProblemError(
@@ -143,7 +143,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
 
 
 def _asked(given: Submission, taken: Taken, shelf: Shelf) -> Asked:
-    """Return the job that a submission makes."""
+    """Return the job for a submission."""
     files, options = dict(taken.files), dict[str, Any]()
     if taken.kind == Kind.replay:
         options = {"fit": given.fit, "score": given.score}

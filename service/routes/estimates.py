@@ -1,4 +1,4 @@
-"""Estimates of a recording, or of what a campaign has computed: jobs like any other."""
+"""Estimates from a recording, or from the results of a campaign: jobs like any other."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Reference = Annotated[str | None, Field(min_length=1, max_length=200)]
 
 
 class EstimateRequest(BaseModel):
-    """What is to be estimated, and of what: of one of the two."""
+    """An estimate and its data: either a recording or a job."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -33,7 +33,7 @@ class EstimateRequest(BaseModel):
 
 
 def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
-    """Return the route that asks for an estimate."""
+    """Return the route that accepts an estimate."""
     router = APIRouter(tags=["estimates"], route_class=BoundedRoute)
 
     @router.post(
@@ -62,7 +62,7 @@ def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
 
 
 def _data_of(given: EstimateRequest, store: Store, recordings: RecordingStore) -> tuple[str, Path]:
-    """Return what an estimate is made of: its name in the folder of the job, and its file."""
+    """Return the data of an estimate: their name in the folder of the job, and their file."""
     if given.recording is not None and given.campaign is None:
         recording = known_recording(recordings, given.recording)
         return recording.name, file_of(recordings, recording)
