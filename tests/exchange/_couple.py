@@ -1,4 +1,4 @@
-"""Two FMUs in each tool that couples them: their outputs after each step. Runs in the Python that has the tool."""
+"""Two FMUs in each tool that couples FMUs: their outputs after each step. Runs in the Python with the tool."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ NAMESPACES = {
 
 
 def fmpy(asked: Request) -> Rows:
-    """Couple them by FMPy's simulation of an SSP."""
+    """Couple the FMUs by FMPy's simulation of an SSP."""
     from fmpy.ssp.simulation import simulate_ssp
 
     step, count = asked["step"], asked["count"]
-    # it steps while the sum of its steps is less than the stop time
+    # FMPy steps while the sum of its steps is less than the stop time
     done = simulate_ssp(str(_ssp(asked)), stop_time=step * (count - 0.5), step_size=step)
     return [[float(row[name]) for name in asked["names"]] for row in done]
 
 
 def libcosim(asked: Request) -> Rows:
-    """Couple them by libcosim's connections."""
+    """Couple the FMUs by libcosim's connections."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
@@ -62,7 +62,7 @@ def libcosim(asked: Request) -> Rows:
 
 
 def ecos(asked: Request) -> Rows:
-    """Couple them by Ecos' connections."""
+    """Couple the FMUs by Ecos' connections."""
     load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
 
@@ -83,7 +83,7 @@ def ecos(asked: Request) -> Rows:
 
 
 def pyfmi(asked: Request) -> Rows:
-    """Couple them by PyFMI's master."""
+    """Couple the FMUs by PyFMI's master."""
     from pyfmi import load_fmu
     from pyfmi.master import Master
 
@@ -102,7 +102,7 @@ def pyfmi(asked: Request) -> Rows:
 
 
 def omsimulator(asked: Request) -> Rows:
-    """Couple them by OMSimulator, from an SSP."""
+    """Couple the FMUs by OMSimulator, from an SSP."""
     stop = asked["step"] * asked["count"]
     options = [f"--stopTime={stop!r}", f"--stepSize={asked['step']!r}", "--resultFile=r.csv"]
     run_program(asked, *options, str(_ssp(asked)))
@@ -110,7 +110,7 @@ def omsimulator(asked: Request) -> Rows:
 
 
 def _ssp(asked: Request) -> Path:
-    """Write the two and their connections as an SSP."""
+    """Write both FMUs and their connections as an SSP."""
     path = Path("pair.ssp").resolve()
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(
@@ -158,7 +158,7 @@ def _add_component(
 
 
 def _add_master_of_omsimulator(system: Element, step: float) -> None:
-    """Add what OMSimulator's program needs to be told in a file: that steps are fixed."""
+    """Add the annotation for OMSimulator's program that steps are fixed."""
     annotations = SubElement(system, "ssd:Annotations")
     own = SubElement(annotations, "ssc:Annotation", type="org.openmodelica")
     about = SubElement(SubElement(own, "oms:Annotations"), "oms:SimulationInformation")

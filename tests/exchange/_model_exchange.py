@@ -1,4 +1,4 @@
-"""One FMU for model exchange in each tool that integrates. Runs in the Python that has the tool."""
+"""One FMU for model exchange in each tool that integrates. Runs in the Python with the tool."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from exchange._single import Request, Rows, columns, run_program
 
 TOLERANCES = (1e-6, 1e-9, 1e-11)
-#: Bodies that are integrated, and their steps.
+#: Bodies to integrate, and their numbers of steps.
 STEPS = {
     "oscillator": 2000,
     "chain of 3": 2000,
@@ -19,23 +19,23 @@ STEPS = {
     "beam, shaken base": 500,
     "chatter": 10_000,
 }
-#: What an error of any smooth output may be over the tolerance: one of a step, and not of a motion with impacts.
+#: Largest error of a smooth output over the tolerance: errors of single steps pass, a motion with other impacts fails.
 ALLOWED = 1e6
-#: The tools' usual tolerance: errors at it are written down, and not judged. Chatter rests too early there.
+#: The tools' usual tolerance: errors at it are listed, not judged. Chatter comes to rest too early there.
 USUAL = 1e-6
-#: The versions of FMI that each tool integrates.
+#: Versions of FMI that each tool integrates.
 VERSIONS = {
     "FMPy": ("2.0", "3.0"),
     "PyFMI": ("2.0", "3.0"),
     "fmusim": ("2.0", "3.0"),
     "OMSimulator": ("2.0",),
 }
-#: An end of a step, in steps.
+#: Distance from the end of a step, in steps, within which a row counts as that end.
 NEAR = 1e-7
 
 
 def fmpy(asked: Request) -> Rows:
-    """Integrate it by FMPy's CVode."""
+    """Integrate the FMU by FMPy's CVode."""
     from fmpy import simulate_fmu
 
     step = asked["step"]
@@ -53,7 +53,7 @@ def fmpy(asked: Request) -> Rows:
 
 
 def pyfmi(asked: Request) -> Rows:
-    """Integrate it by the CVode of PyFMI."""
+    """Integrate the FMU by PyFMI's CVode."""
     from pyfmi import load_fmu
 
     model = load_fmu(asked["fmu"], kind="me")
@@ -67,7 +67,7 @@ def pyfmi(asked: Request) -> Rows:
 
 
 def fmusim(asked: Request) -> Rows:
-    """Integrate it by fmusim's CVode."""
+    """Integrate the FMU by fmusim's CVode."""
     step = asked["step"]
     options = ["--interface-type", "me", "--solver", "cvode", "--tolerance", repr(asked["tolerance"])]
     options += ["--stop-time", repr(step * asked["count"]), "--output-interval", repr(step)]
@@ -78,7 +78,7 @@ def fmusim(asked: Request) -> Rows:
 
 
 def omsimulator(asked: Request) -> Rows:
-    """Integrate it by OMSimulator's CVode."""
+    """Integrate the FMU by OMSimulator's CVode."""
     step = asked["step"]
     options = ["--mode=me", "--solver=cvode", f"--tolerance={asked['tolerance']!r}"]
     options += [f"--stopTime={step * asked['count']!r}", f"--stepSize={step!r}", "--resultFile=r.csv"]
@@ -87,9 +87,9 @@ def omsimulator(asked: Request) -> Rows:
 
 
 def _at_steps(rows: Iterable[list[float]], asked: Request) -> Iterator[list[float]]:
-    """Return the rows at the ends of steps; events have rows too.
+    """Yield the rows at the ends of steps; other rows belong to events.
 
-    A row is NaN where the tool has none: fmusim takes an event within 1e-5 s of the end of a step for that end.
+    A row is NaN if the tool has none: fmusim takes an event within 1e-5 s of the end of a step for that end.
     """
     at: dict[int, list[float]] = {}
     for time, *row in rows:

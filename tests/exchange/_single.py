@@ -1,4 +1,4 @@
-"""One FMU in each tool: what its outputs are after each step. Runs in the Python that has the tool."""
+"""One FMU in each tool: its outputs after each step. Runs in the Python with the tool."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Rows = list[list[float]]
 
 
 def fmpy(asked: Request) -> Rows:
-    """Run it by FMPy."""
+    """Run the FMU by FMPy."""
     from fmpy import simulate_fmu
 
     step, count = asked["step"], asked["count"]
@@ -30,7 +30,7 @@ def fmpy(asked: Request) -> Rows:
 
 
 def libcosim(asked: Request) -> Rows:
-    """Run it by libcosim, which knows variables by reference."""
+    """Run the FMU by libcosim, which knows variables by reference."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
@@ -73,7 +73,7 @@ KINDS = {"Float64": "real", "Real": "real", "Int64": "integer", "Integer": "inte
 
 
 def described(fmu: str) -> dict[str, tuple[int, str]]:
-    """Return reference and kind of each of an FMU's variables: real, integer or boolean; others are left out."""
+    """Return the reference and the kind (real, integer or boolean) of an FMU's variables; others are left out."""
     from fmpy import read_model_description
 
     variables = read_model_description(fmu).modelVariables
@@ -86,7 +86,7 @@ def value_references(fmu: str) -> dict[str, int]:
 
 
 def ecos(asked: Request) -> Rows:
-    """Run it by Ecos."""
+    """Run the FMU by Ecos."""
     load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
 
@@ -115,14 +115,14 @@ def ecos_reader(simulation: Any, outputs: Sequence[tuple[str, str, str]]) -> Cal
 
 
 def load_tbb() -> None:
-    """Load the library of the package tbb, which that of Ecos needs and does not find by itself."""
+    """Load the library of the package tbb; the library of Ecos needs it and does not find it by itself."""
     for library in Path(sys.prefix, "lib").glob("libtbb.so.*"):
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
         break
 
 
 def pyfmi(asked: Request) -> Rows:
-    """Run it by PyFMI."""
+    """Run the FMU by PyFMI."""
     from pyfmi import load_fmu
 
     step, count = asked["step"], asked["count"]
@@ -138,7 +138,7 @@ def pyfmi(asked: Request) -> Rows:
 
 
 def fmusim(asked: Request) -> Rows:
-    """Run it by fmusim of the Reference-FMUs."""
+    """Run the FMU by fmusim of the Reference-FMUs."""
     step = asked["step"]
     options = ["--interface-type", "cs", "--stop-time", repr(step * asked["count"]), "--output-file", "f.csv"]
     options += ["--output-interval", repr(step), "--logging-on"]
@@ -149,7 +149,7 @@ def fmusim(asked: Request) -> Rows:
 
 
 def omsimulator(asked: Request) -> Rows:
-    """Run it by OMSimulator."""
+    """Run the FMU by OMSimulator."""
     step = asked["step"]
     options = ["--mode=cs", f"--stopTime={step * asked['count']!r}", f"--stepSize={step!r}"]
     run_program(asked, *options, "--resultFile=r.csv", asked["fmu"])
@@ -157,7 +157,7 @@ def omsimulator(asked: Request) -> Rows:
 
 
 def compliance_checker(asked: Request) -> Rows:
-    """Run it by the FMU Compliance Checker, and hand on its verdict on the description."""
+    """Run the FMU by the FMU Compliance Checker, and pass on its verdict on the description."""
     step = asked["step"]
     options = ["-k", "cs", "-h", repr(step), "-s", repr(step * asked["count"]), "-o", "c.csv", "-n", "0"]
     run_program(asked, *options, asked["fmu"])
@@ -165,13 +165,13 @@ def compliance_checker(asked: Request) -> Rows:
 
 
 def run_program(asked: Request, *arguments: str) -> None:
-    """Run the tool's program, whose words go where ours go; end where it fails."""
+    """Run the tool's program with this process's output streams; exit if it fails."""
     if code := subprocess.run([asked["program"], *arguments]).returncode:
         raise SystemExit(f"exit code {code}")
 
 
 def columns(path: Path, names: Sequence[str]) -> Iterator[list[float]]:
-    """Return the columns of a CSV file by name, one row for each time: the last that was written at it."""
+    """Yield the rows of named columns of a CSV file, one for each time: the last row at that time."""
     with path.open(newline="") as file:
         header, *lines = csv.reader(file, skipinitialspace=True)
         places = [header.index(name) for name in names]

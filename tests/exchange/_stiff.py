@@ -1,8 +1,8 @@
-"""A chain of 12 masses with stiff dashpots: how many steps an integrator takes says whether it has the Jacobian.
+"""A chain of 12 masses with stiff dashpots: the number of an integrator's steps shows whether it has the Jacobian.
 
-PyFMI and CasADi make it by setting states one by one. PyFMI does not look at a refusal: its Jacobian is zero then, and
-its steps are those of a method that is not for stiff problems, 5,669,129 for 3,238 in a chain of five masses.
-Runs in the Python that has the tool.
+PyFMI and CasADi compute the Jacobian by setting states one by one. PyFMI ignores a refusal, and its Jacobian is zero
+then. Its steps become those of a method for non-stiff problems: 5,669,129 in place of 3,238 in a chain of five masses.
+Runs in the Python with the tool.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MASSES = 12
 STOP_TIME = 5.0
 TOLERANCE = 1e-6
 MOST_STEPS = 5000
-"""Steps with the Jacobian, and some more; without it there are a hundred times as many."""
+"""Largest number of steps with the Jacobian, with a margin; without the Jacobian it is a hundred times as large."""
 STARTS = {
     **{f"mass[{k}]": 1.0 + 0.1 * k for k in range(1, MASSES + 1)},
     **{f"stiffness[{k}]": 1000.0 for k in range(1, MASSES + 1)},
@@ -28,7 +28,7 @@ STARTS = {
     **{f"forcing.amplitude[{k}]": 100.0 for k in range(1, MASSES + 1)},
 }
 VERSIONS = {"FMPy": ("2.0", "3.0"), "CasADi": ("2.0", "3.0"), "PyFMI": ("2.0", "3.0")}
-"""Tools that say how many steps they take."""
+"""Tools that report the number of their steps."""
 
 
 def fmpy(asked: Request) -> Rows:

@@ -1,4 +1,4 @@
-"""A system (SSP) of this package in each tool that takes one: its outputs after each step."""
+"""A system (SSP) of this package in each tool that reads systems: its outputs after each step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from exchange._single import Request, Rows, columns, ecos_reader, libcosim_reade
 
 
 def libcosim(asked: Request) -> Rows:
-    """Run it by libcosim, with the step that the archive proposes."""
+    """Run the system by libcosim, with the step that the archive proposes."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimObserver import CosimObserver
 
@@ -27,7 +27,7 @@ def libcosim(asked: Request) -> Rows:
 
 
 def ecos(asked: Request) -> Rows:
-    """Run it by Ecos; its start values are those that its FMUs have."""
+    """Run the system by Ecos; the start values are those of the FMUs."""
     load_tbb()
     from ecospy import EcosSimulation
 
@@ -43,7 +43,7 @@ def ecos(asked: Request) -> Rows:
 
 
 def omsimulator(asked: Request) -> Rows:
-    """Run it by OMSimulator, with the step that the archive proposes."""
+    """Run the system by OMSimulator, with the step that the archive proposes."""
     stop = asked["step"] * asked["count"]
     run_program(asked, f"--stopTime={stop!r}", "--resultFile=r.csv", asked["system"])
     names = [f"{asked['model']}.system.{name}" for name in asked["names"]]

@@ -1,4 +1,4 @@
-"""A stream of events has the last one, whenever it comes."""
+"""A stream of events includes the last event, whenever it comes."""
 
 from __future__ import annotations
 

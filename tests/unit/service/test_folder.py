@@ -1,4 +1,4 @@
-"""The folder of a service that others have been in: one error each, and what is not its own stays."""
+"""The folder of a service with foreign changes: one error each, and foreign files stay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A database that another program holds, or that fails for a while, delays the service and ends nothing."""
+"""A database that another program has locked, or that fails for a while, delays the service and ends nothing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WORKS = 'import time; time.sleep(0.3); print(\'{"total": 1, "done": 1}\')'
 
 @pytest.fixture
 def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
-    """Of a service whose jobs are done in an instant, and which waits for nothing long."""
+    """Yield the store of a service whose jobs finish instantly, and whose pauses are short."""
     monkeypatch.setattr(store_module, "HELD_SECONDS", 0.01)
     monkeypatch.setattr(module, "PAUSE", 0.05)
     monkeypatch.setattr(module, "IDLE", 0.02)
@@ -48,7 +48,7 @@ def supervisor(store: Store) -> Iterator[Supervisor]:
 
 
 def holder(store: Store) -> sqlite3.Connection:
-    """Return another program's connection, which holds the database until it is closed."""
+    """Return another program's connection, which locks the database until it is closed."""
     other = sqlite3.connect(store.folder / DATABASE, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     return other
@@ -95,7 +95,7 @@ def test_a_job_is_taken_up_again_after_a_database_that_failed(
             raise sqlite3.OperationalError("disk I/O error")
 
         patched.setattr(store, "change", fails)
-        assert failed.wait(20.0)  # as the end of the job is noted, or what it said before
+        assert failed.wait(20.0)  # the database fails for the end of the job, or for its last message
     assert until(store, job, State.done).attempts == 2
 
 

@@ -1,4 +1,4 @@
-"""Bodies of requests are made from declared operations: their keys, limits and words."""
+"""Bodies of requests are made from declared operations: their keys, limits and descriptions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requests of strangers: refused by their heads, under names of this service alone, in few lines of the log."""
+"""Unauthenticated requests: refused by their heads, under names of this service alone, in few lines of the log."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_what_is_no_name_of_a_host_is_refused(name: str) -> None:
 
 
 def lines_of(*records: tuple[str, dict[str, Any], float]) -> list[dict[str, Any]]:
-    """Return the lines that become of messages, with their facts, at times."""
+    """Return the log lines of messages with their facts, at given times."""
     written, seldom, form = [], module._Seldom(), module._Lines()
     for message, facts, at in records:
         name = "vibroimpact.service" if facts else "uvicorn.error"

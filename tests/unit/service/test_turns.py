@@ -1,4 +1,4 @@
-"""Requests without the token take turns, and none of them takes a thread: others do not wait behind them."""
+"""Requests without the token take turns, and none of them holds a thread: others do not wait behind them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vibroimpact.service.turns import REST, Turns
 STRANGERS = 6
 TURN_SECONDS = 0.01
 WAITING = 300
-"""Connections to a service that is busy: more than it takes in one pass."""
+"""Number of connections to a busy service: more than it accepts in one pass."""
 
 
 def test_strangers_take_turns_in_their_order_and_leave_half_of_the_time_to_others() -> None:
@@ -136,7 +136,7 @@ def test_a_busy_service_drops_no_connection_that_waits_to_be_taken() -> None:
         busy = threading.Event()
         server.servers[0].get_loop().call_soon_threadsafe(busy.wait)
         try:
-            # one that is dropped tries again after 1 s
+            # a dropped connection is retried after 1 s
             waiting = [socket.create_connection(listening.getsockname(), 0.5) for _ in range(WAITING)]
         finally:
             busy.set()

@@ -1,4 +1,4 @@
-"""`vibroimpact fmu` as a person uses it: what it lists, and what it says of misuse."""
+"""`vibroimpact fmu` as a person uses it: its lists, and its messages for misuse."""
 
 from __future__ import annotations
 

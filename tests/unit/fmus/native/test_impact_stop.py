@@ -1,4 +1,4 @@
-"""An ImpactStop answers its law: values are those of equations.md 6.9 and 6.10, worked out here by hand."""
+"""An ImpactStop answers by its law; the expected values are computed here from equations.md 6.9 and 6.10."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Asked = Callable[..., dict[str, float]]
 
 @pytest.fixture(params=VERSIONS)
 def make(request: pytest.FixtureRequest) -> Iterator[Callable[[dict[str, Value]], Asked]]:
-    """Make a stop; what it returns asks it for its answers."""
+    """Return a function that makes a stop and returns a function to ask it."""
     stops: list[Component] = []
 
     def build(parameters: dict[str, Value]) -> Asked:
@@ -53,7 +53,7 @@ def test_restitution_is_constant_without_a_yield_velocity(make: Callable[..., As
 def test_restitution_falls_with_the_fourth_root_of_speed_above_yield(make: Callable[..., Asked]) -> None:
     ask = make({"restitution": 0.8, "yield_velocity": 0.1})
     assert ask(0.0, 0.05)["applied_restitution"] == ask(0.0, 0.1)["applied_restitution"] == 0.8
-    # sixteen times the yield velocity: half
+    # at sixteen times the yield velocity: half
     assert ask(0.0, -1.6)["applied_restitution"] == pytest.approx(0.4, rel=ROUNDING)
 
 
@@ -85,7 +85,7 @@ def test_slopes_are_the_differences_of_the_force(
         return ask(0.3 + sign * depth, sign * rate)["applied_force"]
 
     answer, h = ask(0.3 + sign * 0.2, sign * 0.7), 1e-5
-    # central differences of a smooth force: h^2 of its third derivative, and rounding / h
+    # central differences of a smooth force: error h^2 times its third derivative, and rounding / h
     assert answer["applied_stiffness"] == pytest.approx(
         (force(0.2 + h, 0.7) - force(0.2 - h, 0.7)) / (2 * h), rel=1e-8
     )
@@ -104,7 +104,7 @@ def test_hertz_and_hunt_crossley_are_what_the_sheet_says(make: Callable[..., Ask
 @pytest.mark.parametrize("law", ["kelvin_voigt", "hunt_crossley"])
 def test_a_stop_never_pulls(make: Callable[..., Asked], law: str) -> None:
     ask = make({"law": law, "stiffness": 10.0, "damping": 2.0})
-    # inside, but leaving so fast that the dashpot would pull
+    # inside the stop, but leaving so fast that the dashpot would pull
     assert ask(0.01, -50.0) == {**dict.fromkeys(ANSWERS, 0.0), "applied_restitution": 1.0}
     assert ask(-0.01, 50.0)["applied_force"] == 0.0
 
@@ -114,7 +114,7 @@ def test_at_its_surface_a_stop_answers_what_it_will_be_a_moment_later(
     make: Callable[..., Asked], position: float
 ) -> None:
     ask = make({"law": "kelvin_voigt", "stiffness": 1e3, "damping": 2.0, "position": position})
-    # on it, and where rounding has put it a little short of it
+    # on the stop, and where rounding puts the body a little before it
     for displacement in (position, position - math.ulp(1.0) * abs(position)):
         answer = ask(displacement, 0.5)
         assert answer["applied_force"] == pytest.approx(1.0, rel=1e-6)

@@ -1,4 +1,4 @@
-"""FMUs for several machines: which libraries are taken, where they lie, and what is said where there are none."""
+"""FMUs for several machines: choice and place of the libraries, and messages when there are none."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FOLDERS = {
 
 @pytest.fixture
 def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Pretend that the package brings libraries along: what they hold does not matter here."""
+    """Pretend that the package contains libraries; their contents do not matter here."""
     folder = tmp_path / "platforms"
     for name in TARGETS:
         (folder / name).mkdir(parents=True)

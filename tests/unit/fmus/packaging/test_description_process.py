@@ -1,4 +1,4 @@
-"""Descriptions of foreign FMUs are read by a process of their own, once for each content."""
+"""A separate process reads the descriptions of foreign FMUs, once for each content."""
 
 import re
 import shutil
@@ -63,7 +63,7 @@ def test_a_parser_gets_a_description_whole() -> None:
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return the readers of files that the other process is asked for from now on."""
+    """Return the list of readers that the other process is asked for from now on."""
     readers = []
     original = archive.read_apart
 

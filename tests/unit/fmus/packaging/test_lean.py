@@ -1,4 +1,4 @@
-"""A lean description has nothing that other tools stumbled over, and its binary is the one that it describes."""
+"""A lean description has nothing that other tools failed on, and it describes the unchanged binary."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ POINTS = {
     "LoadCell": ("force", "impulse", "impact_time", "load", "output"),
     "Exciter": ("input", "displacement", "force"),
 }
-"""Components of one plug, and what is in it."""
+"""Components with one terminal, and its members."""
 
 
 def description(path: Path) -> ElementTree.Element:
@@ -92,7 +92,7 @@ def test_every_start_value_lies_in_its_range_and_every_unknown_says_its_knowns(
 
 
 def test_no_displacement_waits_for_an_input_when_a_run_begins(tmp_path: Path) -> None:
-    # else a body and its stop in another tool are an algebraic loop at the start
+    # a dependency would make a body and its stop an algebraic loop at the start in another tool
     for fmi in VERSIONS:
         root = description(export_fmu("oscillator", tmp_path / f"{fmi}.fmu", fmi=fmi, external=True))
         variables = list(root.find("ModelVariables"))  # type: ignore[arg-type]
@@ -224,7 +224,7 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
         return
     assert "displacement" in plugs["point"]
     if name != "ImpactStop":
-        # a contact and a stop fit together
+        # the terminals of a contact and a stop fit together
         stop = {"displacement", "velocity", "applied_restitution"}
         stop |= {"applied_force", "applied_stiffness", "applied_damping"}
         assert stop <= plugs["contact[1]"].keys()

@@ -1,4 +1,4 @@
-"""What tools stumble over that are not here to be tried: every lean description of both versions has none of it."""
+"""Lean descriptions of both versions avoid the known faults of tools that cannot be tried here."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
 STEPS = 200
-#: Stops that are touched at the start, where a force decides whether a body rests.
+#: Stops that the body touches at the start, where a force decides whether it rests.
 TOUCHING = {"contact[1].law": "restitution", "contact[1].restitution": 0.5}
 YIELDING = {"contact[1].law": "kelvin_voigt", "contact[1].stiffness": 10.0}
 
@@ -65,7 +65,7 @@ def test_a_default_run_gives_numbers_and_no_warning(lean: Path) -> None:
         step_size=step,
         output_interval=step,
         debug_logging=True,
-        # environment and, in FMI 2.0, the name of the instance come first
+        # environment and, in FMI 2.0, the instance name come first
         logger=lambda *arguments: told.append((int(arguments[-3]), str(arguments[-1]))),
     )
     assert not [text for level, text in told if level >= 1]

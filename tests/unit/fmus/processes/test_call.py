@@ -1,4 +1,4 @@
-"""A call in a process of its own answers, or says how it ended; nothing of it outlives the call or its caller."""
+"""A call in a separate process answers, or reports its end; nothing of it outlives the call or its caller."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_a_caller_that_is_ended_leaves_no_process(tmp_path: Path, way: str, numb
 
 @posix
 def test_a_call_that_lets_no_thread_run_ends_though_its_caller_is_gone(tmp_path: Path) -> None:
-    """A library that hangs while it is loaded does so: then the system ends the process, some time after its caller."""
+    """A library that hangs while it is loaded does this: the system ends the process, some time after its caller."""
     program = f"import ctypes; open({str(tmp_path / 'begun')!r}, 'w').close(); ctypes.PyDLL(None).pause()"
     code = (
         "import sys; from vibroimpact.fmus.processes.call import call\n"
