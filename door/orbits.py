@@ -52,7 +52,7 @@ def find_orbits(
     Raises
     ------
     UsageError
-        The scene's body, stops or force are none of those above.
+        The scene has another kind of body, stop or force.
     OrbitError
         There is no orbit near the seed.
 
@@ -122,7 +122,7 @@ def follow(
     Raises
     ------
     UsageError
-        The scene's body, stops or force are none of those above, or a parameter is no number of the scene.
+        The scene has another kind of body, stop or force, or a parameter is no number of the scene.
     OrbitError
         There is no orbit to start from.
 
@@ -210,7 +210,7 @@ def basins(
     Raises
     ------
     UsageError
-        The scene's body, stops or force are none of those above, or the plane has no starts.
+        The scene has another kind of body, stop or force, or the plane has no starts.
     """
     return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number)))
 
@@ -313,7 +313,7 @@ def transients(
     Raises
     ------
     UsageError
-        The scene's body or stops are none of those above, or a number makes no sense.
+        The scene has another kind of body or stop, or a number is out of its range.
 
     Examples
     --------

@@ -114,7 +114,7 @@ class Process(subprocess.Popen[bytes]):
             return self.wait()
 
     def kill_session(self) -> None:
-        """Kill the process and all others in its session, also those left after its end."""
+        """Kill all processes of its session, also those left after its own end."""
         if sys.platform == "win32":
             self.kill()
             return
