@@ -212,15 +212,15 @@ def _slices(store: Store, reader: LandedReader) -> APIRouter:
     @router.get(
         "/campaigns/{name}/slice",
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
-        summary="One variable of the points that have landed so far",
+        summary="One variable of the finished points",
     )
     def one_slice(
         name: str,
         variable: Annotated[str | None, Query(max_length=200)] = None,
         # FastAPI copies defaults, and reads a list from the query only if the default is a list
-        at: Annotated[list[str], Query(max_length=20, description="NAME:VALUE, the nearest there is")] = [],  # noqa: B006
+        at: Annotated[list[str], Query(max_length=20, description="NAME:VALUE, nearest existing")] = [],  # noqa: B006
         within: Annotated[list[str], Query(max_length=20, description="NAME:LOW:HIGH")] = [],  # noqa: B006
-        most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Rows, at most")] = 5000,
+        most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Largest number of rows")] = 5000,
     ) -> SliceAnswer:
         """Return columns with a limited number of rows, thinned evenly; numbers that are not finite become null."""
         job = known_job(store, name)
@@ -279,7 +279,7 @@ def _points(store: Store, reader: LandedReader) -> APIRouter:
     @router.get(
         "/campaigns/{name}/failures",
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
-        summary="Points that did not come to their end, and why",
+        summary="Points that did not reach their end, and why",
     )
     def failures(
         name: str,
@@ -301,7 +301,7 @@ def _points(store: Store, reader: LandedReader) -> APIRouter:
 def _scenes(shelf: Shelf) -> APIRouter:
     router = APIRouter()
 
-    @router.get("/examples", responses=problems(), summary="Scenes to begin with")
+    @router.get("/examples", responses=problems(), summary="Example scenes")
     def examples() -> list[ExampleAnswer]:
         return _examples(shelf)
 

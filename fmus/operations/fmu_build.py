@@ -15,4 +15,4 @@ class BuildFmus(Operation):
     Example: vibroimpact fmu build
     """
 
-    output: Annotated[Path | None, Option(help="Folder to fill; else that of the package.")] = None
+    output: Annotated[Path | None, Option(help="Folder to fill; default: the package's.")] = None

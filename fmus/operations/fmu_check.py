@@ -17,5 +17,5 @@ class CheckFmus(Operation):
     Example: vibroimpact fmu check Oscillator.fmu
     """
 
-    files: Annotated[list[Path] | None, Positional(help="FMU files; all of the package if none.")] = None
+    files: Annotated[list[Path] | None, Positional(help="FMU files; default: all of the package.")] = None
     strict: Annotated[bool, Option("--strict", help=STRICT)] = False

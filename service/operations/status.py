@@ -16,6 +16,6 @@ class Status(ServiceOperation):
     Example: vibroimpact status --data service
     """
 
-    name: Annotated[str | None, Positional(help="The id of one; else all are listed.", metavar="[ID]")] = None
+    name: Annotated[str | None, Positional(help="Id of one; default: all are listed.", metavar="[ID]")] = None
     service: Url = None
     data: Folder = None

@@ -38,14 +38,14 @@ class Submission(BaseModel):
     workers: Annotated[int | None, Field(ge=1, le=MOST_WORKERS, description="Worker processes.")] = None
     recordings: Annotated[
         list[Reference],
-        Field(max_length=100, description="Replayed by a scene with [replay] that names none: names or ids."),
+        Field(max_length=100, description="Names or ids, for a scene with [replay] that names none."),
     ] = []
     fit: Annotated[
         str | None,
         Field(min_length=1, max_length=2000, description="Numbers of a replay to fit, by key, with commas."),
     ] = None
     score: Annotated[
-        list[Reference], Field(max_length=100, description="Recordings to score that are not fitted.")
+        list[Reference], Field(max_length=100, description="Recordings to score without fitting.")
     ] = []
 
 

@@ -27,8 +27,8 @@ class EstimateRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    recording: Annotated[Reference, Field(description="Name or id.")] = None
-    campaign: Annotated[Reference, Field(description="The id of a job that is done.")] = None
+    recording: Annotated[Reference, Field(description="Name or id of a recording.")] = None
+    campaign: Annotated[Reference, Field(description="Id of a finished job.")] = None
     estimate: Estimate
 
 

@@ -72,7 +72,7 @@ def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
     async def upload(
         request: Request,
         response: Response,
-        name: Annotated[str, Query(pattern=NAME, description="By which scenes name it.")],
+        name: Annotated[str, Query(pattern=NAME, description="Name for scenes.")],
     ) -> Component:
         """Accept an uploaded FMU, also of a user's contact law, if the service was started with `--allow-fmu-upload`.
 

@@ -91,7 +91,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
         request: Request,
         response: Response,
         name: Annotated[
-            str, Query(pattern=NAME, description="Of the file; its ending helps to know its format.")
+            str, Query(pattern=NAME, description="Name of the file; its extension helps to find its format.")
         ],
         settings: Annotated[
             str,

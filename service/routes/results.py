@@ -43,7 +43,7 @@ def results_router(store: Store) -> APIRouter:
     @router.get("/campaigns/{name}/scene", response_class=PlainTextResponse, responses=absent)
     def scene(
         name: str,
-        fitted: Annotated[bool, Query(description="With the numbers that a fit has found.")] = False,
+        fitted: Annotated[bool, Query(description="Whether to return the fitted numbers.")] = False,
     ) -> Response:
         """Return the submitted scene, or the fitted one."""
         known_job(store, name)

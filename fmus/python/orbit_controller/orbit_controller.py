@@ -87,16 +87,16 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
             "count": (Integer, Fmi2Variability.discrete, "Number of impacts of the body"),
             "last_time": (Real, Fmi2Variability.continuous, "Time of the last impact"),
             "last_phase": (Real, Fmi2Variability.continuous, "Forcing phase of the last impact"),
-            "last_velocity": (Real, Fmi2Variability.continuous, "Speed towards the stop before it"),
+            "last_velocity": (Real, Fmi2Variability.continuous, "Speed before the last impact"),
         }
         for name, (kind, variability, text) in inputs.items():
             self._register_input(name, kind, variability, text)
         outputs = {
             "forcing_amplitude": (Real, "Amplitude of the force until the next impact", self._force),
-            "forcing_angular_frequency": (Real, "Angular frequency until then", self._frequency),
-            "correction": (Real, "Of the amplitude", lambda: self._decided().correction),
-            "row": (Integer, "Row of the plan that is in force, from 0", lambda: self._decided().row),
-            "kept": (Boolean, "Whether the orbit has not been lost", lambda: self._decided().kept),
+            "forcing_angular_frequency": (Real, "Angular frequency until the next impact", self._frequency),
+            "correction": (Real, "Correction of the amplitude", lambda: self._decided().correction),
+            "row": (Integer, "Present row of the plan, from 0", lambda: self._decided().row),
+            "kept": (Boolean, "Whether the orbit is still kept", lambda: self._decided().kept),
         }
         for name, (kind, text, getter) in outputs.items():
             variability = Fmi2Variability.continuous if kind is Real else Fmi2Variability.discrete
@@ -111,11 +111,11 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
                 )
             )
         parameters = {
-            "tolerance": (Real, "Difference of two speeds in a row at which the plan goes on"),
+            "tolerance": (Real, "Difference of two successive speeds below which the next row begins"),
             "limit": (Real, "Largest correction of the amplitude"),
-            "noise": (Real, "Standard deviation of the error of measured speeds, relative"),
-            "seed": (Integer, "Of the noise"),
-            "active": (Boolean, "Whether the amplitude is corrected at all"),
+            "noise": (Real, "Relative standard deviation of the error of measured speeds"),
+            "seed": (Integer, "Seed of the noise"),
+            "active": (Boolean, "Whether the amplitude is corrected"),
         }
         for name, (kind, text) in parameters.items():
             self.register_variable(
