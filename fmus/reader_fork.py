@@ -101,7 +101,7 @@ def read_in_fork(order: Order) -> Answer | None:
 
 
 def _end(process: int) -> int:
-    """Kill a finished process, whatever it does; return its status, 0 if another thread has collected it."""
+    """Kill a process whose work is over; return its status, 0 if another thread has collected it."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
     try:

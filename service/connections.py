@@ -36,9 +36,9 @@ MOST_HEAD = 16 * 2**10
 HEAD_SECONDS = 10.0
 """Time for a whole head to arrive, s; then the connection is closed."""
 CREDIT_SECONDS = 30.0
-"""Silence of a body that should arrive, or of a reader of an answer, after which the connection is closed, s."""
+"""Silence of a body that should arrive, or of an answer's reader, after which the connection is closed, s."""
 LEAST_RATE = 10_000.0
-"""Mean rate of a body, byte/s, below which it uses up the credit of `CREDIT_SECONDS`."""
+"""Mean rate of a body, or of reading an answer, byte/s, below which the credit of `CREDIT_SECONDS` is used up."""
 SWEEP_SECONDS = 1.0
 """Interval between two checks of all connections, s."""
 DESCRIPTORS = 4096

@@ -28,7 +28,7 @@ def default_experiment(component: str, starts: Starts, stop_time: float | None =
     """Return the default experiment of a body, from all its start values by variable name.
 
     Without a stop time (s) it has `PERIODS` periods of the slowest natural frequency or of the forcing, whichever is
-    slower. It has `STEPS_PER_PERIOD` steps in each of the fastest periods, and at most `MOST_STEPS`; both times are
+    slower. It has `STEPS_PER_PERIOD` steps in the fastest period, and at most `MOST_STEPS` in total; both times are
     rounded to two digits. Where the frequencies are too large or too small, FMI's usual ten seconds apply.
     """
     try:

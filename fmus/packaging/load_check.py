@@ -16,7 +16,7 @@ from typing import Any
 from vibroimpact.fmus.packaging.build import fmi_headers
 
 EXPORTED = {"2": r"FMI2_Export\s+fmi2\w+TYPE\s+(fmi2\w+);", "3": r"FMI3_Export\s+fmi3\w+TYPE\s+(fmi3\w+);"}
-#: Prefixes of model-exchange functions: FMI 3.0 requires all functions, FMI 2.0 only those of the FMU's interfaces.
+#: Parts of FMI 2.0's header: FMI 2.0 requires only the functions of the FMU's interfaces, FMI 3.0 requires all.
 MODEL_EXCHANGE = re.compile(
     r"(?s)Functions for FMI2 for Model Exchange.*?Functions for FMI2 for Co-Simulation"
 )
