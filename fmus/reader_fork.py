@@ -23,7 +23,7 @@ from vibroimpact.fmus.reader_orders import Answer, Order, received
 GRACE = 10.0
 #: Wall time after which a sleeping fork without progress is abandoned, s; a fork that waits for a disk is not.
 PATIENCE_WITH_SLEEP = 3.0
-_GLANCE = 0.2
+_WATCH_INTERVAL = 0.2
 """Interval between two checks of a fork, s."""
 _ANSWER = 3
 
@@ -40,7 +40,7 @@ class _Watch:
 
     def _look(self) -> None:
         before, since = "", time.monotonic()
-        while not self._over.wait(_GLANCE):
+        while not self._over.wait(_WATCH_INTERVAL):
             now = time.monotonic()
             seen = _asleep_at(self._process)
             if not seen or seen != before:

@@ -128,10 +128,10 @@ class Service:
             text = Path(scene).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise UsageError(f"{scene}: expected a scene file, got {error}.") from None
-        asked: dict[str, Any] = {"scene": text, "workers": workers}
+        body: dict[str, Any] = {"scene": text, "workers": workers}
         if recordings or score or fit is not None:
-            asked |= {"fit": fit, "recordings": _names(recordings), "score": _names(score)}
-        return self._accepted_job("/campaigns", asked)
+            body |= {"fit": fit, "recordings": _names(recordings), "score": _names(score)}
+        return self._accepted_job("/campaigns", body)
 
     def estimate(self, kind: str, data: RemoteRecording | RemoteJob, **options: Any) -> RemoteJob:
         """Estimate from a recording of the service, or from the results of one of its jobs.
@@ -151,10 +151,10 @@ class Service:
         source = "recording" if isinstance(data, RemoteRecording) else "campaign"
         return self._accepted_job("/estimates", {source: data.id, "estimate": {"kind": kind, **options}})
 
-    def _accepted_job(self, path: str, asked: dict[str, Any]) -> RemoteJob:
+    def _accepted_job(self, path: str, body: dict[str, Any]) -> RemoteJob:
         # one key for all attempts: a lost answer starts nothing twice
         key = {"Idempotency-Key": uuid.uuid4().hex}
-        return RemoteJob(self, self.told("POST", path, json=asked, headers=key))
+        return RemoteJob(self, self.told("POST", path, json=body, headers=key))
 
     def upload_recording(
         self,
@@ -254,15 +254,15 @@ class Service:
         """
         answer = self.ask(method, path, **request)
         try:
-            told = answer.json()
+            content = answer.json()
         except ValueError:
-            told = None
-        if not isinstance(told, dict):
+            content = None
+        if not isinstance(content, dict):
             got = answer.headers.get("Content-Type", "nothing")
             raise ServiceError(
                 f"{self._base}: expected a service of vibroimpact, got another's answer ({got})."
             )
-        return told
+        return content
 
     @contextlib.contextmanager
     def stream(self, path: str, **request: Any) -> Iterator[httpx.Response]:
@@ -321,8 +321,8 @@ def _accepted(answer: httpx.Response) -> httpx.Response:
     if answer.is_success:
         return answer
     try:
-        told = answer.json()
-        detail, problems = str(told["detail"]), told.get("problems")
+        content = answer.json()
+        detail, problems = str(content["detail"]), content.get("problems")
     except (ValueError, KeyError, TypeError):
         detail, problems = f"{answer.status_code} {answer.reason_phrase}", None
     raise ServiceError(detail, answer.status_code, problems)

@@ -47,9 +47,9 @@ RESERVED = 200
 """Number of open files for other uses: database, pipes, files that are sent, new connections."""
 FEWEST_CONNECTIONS = 16
 """Number of connections allowed even where the system allows few open files."""
-ROOM = 32
+CLOSED_IN_SHORTAGE = 32
 """Number of unauthenticated connections to close when the system runs out of open files."""
-SAID_SECONDS = 60.0
+LOG_INTERVAL = 60.0
 """Interval at which a lasting shortage is logged again, s."""
 LOG = logging.getLogger("vibroimpact.service")
 KNOWN = "vibroimpact.known"
@@ -90,7 +90,7 @@ class Connections:
         self.turns = Turns()
         self._open: dict[LimitedProtocol, None] = {}
         self._sweep: asyncio.TimerHandle | None = None
-        self._swept, self._said = 0.0, -SAID_SECONDS
+        self._swept, self._logged = 0.0, -LOG_INTERVAL
 
     def __len__(self) -> int:
         """Return the number of open connections."""
@@ -100,10 +100,10 @@ class Connections:
         """Add a connection; above the limit, close the oldest expendable ones, else the new one."""
         self._open[connection] = None
         if len(self._open) > self._most:
-            spared = list(islice(self._spared(self._old()), max(1, int(SHARE_CLOSED * self._most))))
-            if not spared and len(self._open) > self._most_with_young:
-                spared = next(([one] for one in self._spared(self._others(connection))), [connection])
-            for one in spared:
+            expendable = list(islice(self._expendable(self._old()), max(1, int(SHARE_CLOSED * self._most))))
+            if not expendable and len(self._open) > self._most_with_young:
+                expendable = next(([one] for one in self._expendable(self._others(connection))), [connection])
+            for one in expendable:
                 self._close(one)
         if self._sweep is None and self._open:
             self._swept = time.monotonic()
@@ -120,10 +120,10 @@ class Connections:
         if not (isinstance(error, OSError) and error.errno in SHORT):
             loop.default_exception_handler(context)
             return
-        for connection in list(islice(self._spared(list(self._open)), ROOM)):
+        for connection in list(islice(self._expendable(list(self._open)), CLOSED_IN_SHORTAGE)):
             self._close(connection)
-        if time.monotonic() - self._said >= SAID_SECONDS:
-            self._said = time.monotonic()
+        if time.monotonic() - self._logged >= LOG_INTERVAL:
+            self._logged = time.monotonic()
             LOG.warning("no connection can be taken now", extra={"why": str(error)})
 
     def _old(self) -> list[LimitedProtocol]:
@@ -134,7 +134,7 @@ class Connections:
     def _others(self, new: LimitedProtocol) -> list[LimitedProtocol]:
         return [one for one in self._open if one is not new]
 
-    def _spared(self, among: Sequence[LimitedProtocol]) -> Iterator[LimitedProtocol]:
+    def _expendable(self, among: Sequence[LimitedProtocol]) -> Iterator[LimitedProtocol]:
         """Yield connections in the order of closing: unauthenticated ones first, those with a whole request later."""
         yield from (one for one in among if not one.is_known and not one.is_whole())
         yield from (one for one in among if not one.is_known and one.is_whole())
@@ -193,7 +193,7 @@ class LimitedProtocol(H11Protocol):
         self._received = 0
         self._unsent = 0
         self._phase: tuple[str, object] = ("head", None)
-        self._left = HEAD_SECONDS
+        self._credit = HEAD_SECONDS
         self.all_open.add(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -226,7 +226,7 @@ class LimitedProtocol(H11Protocol):
 
     def resume_writing(self) -> None:
         """Restore the credit: the answer is being read."""
-        self._left = CREDIT_SECONDS
+        self._credit = CREDIT_SECONDS
         super().resume_writing()
 
     def is_whole(self) -> bool:
@@ -238,10 +238,10 @@ class LimitedProtocol(H11Protocol):
         phase = (self._waits_for(), self.cycle)
         if phase != self._phase:
             self._phase = phase
-            self._left = CREDIT_SECONDS if phase[0] in ("body", "reader") else HEAD_SECONDS
+            self._credit = CREDIT_SECONDS if phase[0] in ("body", "reader") else HEAD_SECONDS
         earned = self._earned()
-        self._left = min(self._left - seconds + earned, CREDIT_SECONDS)
-        if self._left < 0.0:
+        self._credit = min(self._credit - seconds + earned, CREDIT_SECONDS)
+        if self._credit < 0.0:
             self._give_up()
 
     def _waits_for(self) -> str:

@@ -28,12 +28,12 @@ class Hosts:
 
     def __init__(self, address: str, names: Sequence[str] = ()) -> None:
         given = [name.strip("[]").rstrip(".").lower() for name in names]
-        for name, said in zip(given, names, strict=True):
+        for name, text in zip(given, names, strict=True):
             if not _NAME.fullmatch(name) and _address(name) is None:
                 raise UsageError(
                     message(
                         Argument("allow_host"),
-                        f": expected a name such as lab.example, without port, got {said!r}.",
+                        f": expected a name such as lab.example, without port, got {text!r}.",
                     )
                 )
         self._names = sorted({*given, LOCAL, *([] if _is_any(address) else [address.lower()])})

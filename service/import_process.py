@@ -18,14 +18,14 @@ from vibroimpact.service.memory import import_memory
 from vibroimpact.service.passing import FULL
 
 
-def limit_memory(wanted: int) -> None:
+def limit_memory(size: int) -> None:
     """Let allocations beyond an address space (byte) fail."""
     if sys.platform == "linux":
         import resource
 
         _, most = resource.getrlimit(resource.RLIMIT_AS)
-        wanted = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
-        resource.setrlimit(resource.RLIMIT_AS, (wanted, most))
+        size = size if most == resource.RLIM_INFINITY else min(size, most)
+        resource.setrlimit(resource.RLIMIT_AS, (size, most))
 
 
 def contents(recording: Recording) -> list[dict[str, Any]]:

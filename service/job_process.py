@@ -30,7 +30,7 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
 from vibroimpact.service.passing import FULL, SHORT
 
-SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
+REPORT_INTERVAL, REPORT_SHARE = 0.25, 1.0 / 500.0
 """Least interval between two reports of progress, s, and least share of the points: each report becomes an event."""
 INTERRUPTED, LATER = 130, 75
 """Exit codes of a job that was interrupted in good order, and of a job that cannot go on now but may later."""
@@ -64,25 +64,25 @@ def say(**what: Any) -> None:
     sys.stdout.flush()
 
 
-class Told(Progress):
+class ReportedProgress(Progress):
     """Progress that is reported to the service."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._last, self._told = 0.0, 0
+        self._last, self._reported = 0.0, 0
 
     def begin(self, total: int, done: int, said: str = "") -> None:
         """Report the totals at once."""
         super().begin(total, done, said)
-        self._told = done
+        self._reported = done
         say(total=total, done=done)
 
     def advance(self, points: int) -> None:
         """Report at intervals, and at the end."""
         super().advance(points)
-        news = self._done - self._told >= SAID_PART * self._total
-        if (news and time.monotonic() - self._last >= SAID_EVERY) or self._done == self._total:
-            self._last, self._told = time.monotonic(), self._done
+        news = self._done - self._reported >= REPORT_SHARE * self._total
+        if (news and time.monotonic() - self._last >= REPORT_INTERVAL) or self._done == self._total:
+            self._last, self._reported = time.monotonic(), self._done
             say(total=self._total, done=self._done)
 
     def note(self, text: str) -> None:
@@ -92,7 +92,7 @@ class Told(Progress):
 
 def run(folder: Path, work: Work) -> None:
     """Do the work of a job in its folder."""
-    progress = Told()
+    progress = ReportedProgress()
     if work.kind == "estimate":
         from vibroimpact.service.requests import estimate
 

@@ -270,32 +270,32 @@ def _quantity(variable: netCDF4.Variable[Any]) -> Quantity:
 
 
 def _rows(
-    file: netCDF4.Dataset, asked: Quantity, count: int
+    file: netCDF4.Dataset, quantity: Quantity, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the run of each value of a variable, and the values."""
     places = np.arange(count, dtype=np.int64)
-    if asked.name == RANGE:
+    if quantity.name == RANGE:
         high, low = (file[name][:] for name in RANGE_ENDS)
         empty = np.isnan(high).all(axis=1)
         largest = np.where(empty, np.nan, np.max(high, axis=1, initial=-np.inf, where=~np.isnan(high)))
         smallest = np.where(empty, np.nan, np.min(low, axis=1, initial=np.inf, where=~np.isnan(low)))
         return places, largest - smallest
-    if asked.name == LARGEST_IMPACT:
+    if quantity.name == LARGEST_IMPACT:
         largest = np.full(count, -np.inf)
         hit = np.repeat(places, file["impact_count"][:])
         np.fmax.at(largest, hit, np.asarray(file["impact_velocity"][:], dtype=np.float64))
         return places, np.where(np.isfinite(largest), largest, np.nan)
-    if asked.name == MEAN_IMPACTS:
+    if quantity.name == MEAN_IMPACTS:
         each = np.asarray(file["impacts_per_period"][:], dtype=np.float64)
         there = ~np.isnan(each)
         mean = np.sum(each, axis=1, where=there) / np.maximum(there.sum(axis=1), 1)
         return places, np.where(mean > 0.0, mean, np.nan)
-    variable = file[asked.name]
+    variable = file[quantity.name]
     values = np.asarray(variable[...], dtype=np.float64)
     if variable.dimensions[0] == "run":
         width = 1 if values.ndim == 1 else values.shape[1]
         return np.repeat(places, width), values.reshape(-1)
-    counts = file[f"{asked.along}_count"][:]
+    counts = file[f"{quantity.along}_count"][:]
     return np.repeat(places, counts), values
 
 

@@ -18,7 +18,7 @@ _BEGINNING = 40
 """Number of characters that identify a message of a library."""
 
 
-class _Seldom(logging.Filter):
+class _RepeatFilter(logging.Filter):
     """Filter that passes a few similar lines, and adds the number of omitted ones to the next.
 
     The service's own lines always pass, except those with `alike`, which names their kind.
@@ -66,6 +66,6 @@ def write_lines() -> None:
     """Let this process log in lines of JSON: all of the service's messages, warnings of other modules."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Lines())
-    handler.addFilter(_Seldom())
+    handler.addFilter(_RepeatFilter())
     logging.basicConfig(handlers=[handler], level=logging.WARNING, force=True)
     logging.getLogger("vibroimpact.service").setLevel(logging.INFO)

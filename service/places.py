@@ -48,14 +48,14 @@ class Places:
 
         The place of an absent key is that of its nearest table, else (1, 1).
         """
-        wanted = _bare(_LAST_INDEX.sub("", key))
-        full = wanted
+        target = _bare(_LAST_INDEX.sub("", key))
+        full = target
         while full not in self._places:
             full = full[: max(full.rfind("."), full.rfind("["), 0)]
             if not full:
                 return 1, 1
         number, column, line = self._places[full]
-        return number, _within(line, column, wanted[len(full) :])
+        return number, _within(line, column, target[len(full) :])
 
 
 def _within(line: str, column: int, rest: str) -> int:

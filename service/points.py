@@ -31,12 +31,12 @@ def simulated_point(scene: Path, results: Path, run: int) -> dict[str, Any]:
             {"Retry-After": "1"},
         )
     try:
-        said = _answer(scene, results, run)
+        found = _answer(scene, results, run)
     finally:
         _FREE.release()
-    if "failed" in said:
-        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, said["failed"])
-    return said
+    if "failed" in found:
+        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, found["failed"])
+    return found
 
 
 def _answer(scene: Path, results: Path, run: int) -> dict[str, Any]:

@@ -167,15 +167,15 @@ def imported(file: Path, target: Path, settings: str) -> list[dict[str, Any]]:
     """
     function = "vibroimpact.service.import_process:answer"
     done = call(function, str(file), str(target), settings, seconds=IMPORT_SECONDS, errors="dropped")
-    told = done.answer or {}
-    if "full" in told:
-        raise OSError(*told["full"])
-    if "channels" not in told:
+    reply = done.answer or {}
+    if "full" in reply:
+        raise OSError(*reply["full"])
+    if "channels" not in reply:
         late = f", after {IMPORT_SECONDS:.0f} s" if done.is_late else ""
         end = f"{file.name}: expected a recording, got a file whose import {ending(done.code)}{late}."
-        why = told.get("failed") or end
+        why = reply.get("failed") or end
         raise UsageError(str(why))
-    channels: list[dict[str, Any]] = told["channels"]
+    channels: list[dict[str, Any]] = reply["channels"]
     return channels
 
 

@@ -78,8 +78,8 @@ def estimate(folder: Path, options: dict[str, Any]) -> None:
 
     The options are `data`, the name of a recording or a dataset in the folder, and `asked`, an `Estimate`.
     """
-    asked = _ESTIMATE.validate_python(options["asked"]).model_dump()
-    declared = ESTIMATES[asked["kind"]]
-    given = {field.name: asked[key] for key, field, _ in _offered(declared)}
+    arguments = _ESTIMATE.validate_python(options["asked"]).model_dump()
+    declared = ESTIMATES[arguments["kind"]]
+    given = {field.name: arguments[key] for key, field, _ in _offered(declared)}
     place: dict[str, Any] = {"data": folder / options["data"], "output": folder / OUTPUT, "force": True}
     declared(**place, **given).carry_out(spelling=str)  # the arguments have Python's names

@@ -132,8 +132,8 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A request for a job."""
+class NewJob:
+    """A new job, before it is accepted."""
 
     kind: Kind
     title: str
@@ -222,7 +222,7 @@ class Store:
     # ---- jobs ----
 
     def submit(
-        self, asked: Asked, *, key: str = "", digest: str = "", most_queued: int | None = None
+        self, new_job: NewJob, *, key: str = "", digest: str = "", most_queued: int | None = None
     ) -> tuple[Job, bool]:
         """Accept a request; return its job, and whether the job is new.
 
@@ -239,13 +239,13 @@ class Store:
             if most_queued is not None and self.counts()[State.queued] >= most_queued:
                 raise QueueFullError
             name = uuid.uuid4().hex
-            self._fill(name, asked)
+            self._fill(name, new_job)
             database.execute(
                 "INSERT INTO jobs (id, title, state, workers, kind, created, total, done, attempts, message, options) "
                 "VALUES (?, ?, ?, ?, ?, ?, 0, 0, 0, '', ?)",
                 (
-                    *(name, asked.title, State.queued, asked.workers, asked.kind, time.time()),
-                    json.dumps(asked.options),
+                    *(name, new_job.title, State.queued, new_job.workers, new_job.kind, time.time()),
+                    json.dumps(new_job.options),
                 ),
             )
             if key:
@@ -253,14 +253,14 @@ class Store:
             self._tell(database, name, "state")
             return self.job(name), True
 
-    def _fill(self, name: str, asked: Asked) -> None:
+    def _fill(self, name: str, new_job: NewJob) -> None:
         """Make the folder of a job, with its scene and the files that it reads."""
         folder = self.folder_of(name)
         folder.mkdir(parents=True)
         try:
-            if asked.text:
-                write_atomically(self.scene_of(name), asked.text.encode())
-            for link, file in asked.files.items():
+            if new_job.text:
+                write_atomically(self.scene_of(name), new_job.text.encode())
+            for link, file in new_job.files.items():
                 _link(file, folder / link)
         except OSError:
             shutil.rmtree(folder)

@@ -131,7 +131,7 @@ class Supervisor:
                 process = self._open(job, folder)
                 self._pause = 0.0
                 with process:  # closes its pipes
-                    told = self._listen(job, process, log)
+                    report = self._listen(job, process, log)
                     code = process.wait()
                     process.kill_session()  # ends workers that outlived it
         except OSError as error:
@@ -142,7 +142,7 @@ class Supervisor:
             raise
         with self._lock:
             self._running = None
-        self._note_end(job, code, told)
+        self._note_end(job, code, report)
 
     def _open(self, job: Job, folder: Path) -> Process:
         work = Work(job.kind, job.workers, self._scheduler, job.options)
@@ -154,13 +154,13 @@ class Supervisor:
             self._stop(job.id)
         return process
 
-    def _listen(self, job: Job, process: Process, log: JobLog) -> Told:
+    def _listen(self, job: Job, process: Process, log: JobLog) -> JobReport:
         """Read the messages of a process until it ends."""
-        told = Told()
+        report = JobReport()
 
         def copy_errors() -> None:
             for line in process.lines_of_errors():
-                told.last.append(line)
+                report.last.append(line)
                 log.write(line)
 
         errors = threading.Thread(target=copy_errors, daemon=True)
@@ -169,58 +169,58 @@ class Supervisor:
         except RuntimeError as error:  # no further thread: the machine is short of memory or processes
             raise OSError(errno.ENOMEM, str(error)) from error
         for line in process.lines():
-            said = _said(line)
-            total, done = said.get("total"), said.get("done")
+            content = _message_in(line)
+            total, done = content.get("total"), content.get("done")
             if isinstance(total, int) and isinstance(done, int):
-                told.total, told.done = total, done
-                self._note_progress(job, told)
-            told.failed = said.get("failed", told.failed)
-            told.later = said.get("later", told.later)
-            told.outcomes = said.get("outcomes", told.outcomes)
-            text = said.get("note") or said.get("failed") or said.get("later")
+                report.total, report.done = total, done
+                self._note_progress(job, report)
+            report.failed = content.get("failed", report.failed)
+            report.later = content.get("later", report.later)
+            report.outcomes = content.get("outcomes", report.outcomes)
+            text = content.get("note") or content.get("failed") or content.get("later")
             if text:
                 log.write(text)
         errors.join(timeout=GRACE)
-        return told
+        return report
 
-    def _note_progress(self, job: Job, told: Told) -> None:
+    def _note_progress(self, job: Job, report: JobReport) -> None:
         """Store the progress of a job; if the database is unavailable, a later update or the end of the job does."""
         try:
-            self._store.change(job.id, total=told.total, done=told.done)
+            self._store.change(job.id, total=report.total, done=report.done)
         except sqlite3.Error as error:
-            if not _passes(error):
+            if not _is_temporary(error):
                 raise
             LOG.warning("its progress is not noted", extra={"job": job.id, "why": str(error)})
 
-    def _note_end(self, job: Job, code: int, told: Told) -> None:
+    def _note_end(self, job: Job, code: int, report: JobReport) -> None:
         if self._store.job(job.id).state == State.cancelling:
-            self._end(job, State.cancelled, "cancelled", told)
+            self._end(job, State.cancelled, "cancelled", report)
         elif code == 0:
-            self._end(job, State.done, "", told)
+            self._end(job, State.done, "", report)
         elif self._closing.is_set():
             self._change(job, state=State.queued, message="the service was stopped")
         elif code == LATER:
             # the hindrance is not the fault of the job, and does not count as an attempt
-            self._change(job, state=State.queued, message=told.later, attempts=job.attempts)
+            self._change(job, state=State.queued, message=report.later, attempts=job.attempts)
             self._closing.wait(PAUSE)
-        elif told.failed:
-            self._end(job, State.failed, told.failed, told)
-        elif code < 0 and told.done > job.done:
+        elif report.failed:
+            self._end(job, State.failed, report.failed, report)
+        elif code < 0 and report.done > job.done:
             self._change(job, state=State.queued, message=f"its process {ending(code)}", attempts=0)
         elif code in (INTERRUPTED, -signal.SIGINT) or (code < 0 and job.attempts + 1 < MOST_ATTEMPTS):
             self._change(job, state=State.queued, message=f"its process {ending(code)}")
         else:
-            last = [line for line in told.last if line.strip()]
+            last = [line for line in report.last if line.strip()]
             self._end(
-                job, State.failed, f"its process {ending(code)}" + (f": {last[-1]}" if last else ""), told
+                job, State.failed, f"its process {ending(code)}" + (f": {last[-1]}" if last else ""), report
             )
 
-    def _end(self, job: Job, state: State, message: str, told: Told | None = None) -> None:
+    def _end(self, job: Job, state: State, message: str, report: JobReport | None = None) -> None:
         known: dict[str, Any] = (
-            {} if told is None else {"outcomes": json.dumps(_sum(job.outcomes, told.outcomes))}
+            {} if report is None else {"outcomes": json.dumps(_sum(job.outcomes, report.outcomes))}
         )
-        if told is not None and told.total:
-            known |= {"total": told.total, "done": told.done}
+        if report is not None and report.total:
+            known |= {"total": report.total, "done": report.done}
         self._change(job, state=state, ended=time.time(), message=message, **known)
 
     def _change(self, job: Job, **values: Any) -> None:
@@ -229,7 +229,7 @@ class Supervisor:
             try:
                 self._store.change(job.id, **values)
             except sqlite3.Error as error:
-                if not _passes(error):
+                if not _is_temporary(error):
                     raise
                 LOG.warning("its end is not noted yet", extra={"job": job.id, "why": str(error)})
                 if self._closing.wait(PAUSE):
@@ -247,7 +247,7 @@ class Supervisor:
 
 
 @dataclass(slots=True)
-class Told:
+class JobReport:
     """Messages of a process about its job: progress, reason of failure or waiting, outcomes of points, last lines."""
 
     total: int = 0
@@ -281,18 +281,18 @@ class JobLog:
             LOG.warning("a line of its log is lost", extra={"job": self._job, "why": str(error)})
 
 
-def _passes(error: sqlite3.Error) -> bool:
+def _is_temporary(error: sqlite3.Error) -> bool:
     """Return whether an error of the database may pass by itself."""
     return is_full(error) or is_held(error) or is_short(error)
 
 
-def _said(line: str) -> dict[str, Any]:
+def _message_in(line: str) -> dict[str, Any]:
     """Return the message in a line of a process; a line that is no JSON object is a remark, of an FMU that prints."""
     try:
-        said = json.loads(line)
+        content = json.loads(line)
     except ValueError:
-        said = None
-    return said if isinstance(said, dict) else {"note": line}
+        content = None
+    return content if isinstance(content, dict) else {"note": line}
 
 
 def _sum(first: Mapping[str, int], second: Mapping[str, int]) -> dict[str, int]:

@@ -6,7 +6,7 @@ import asyncio
 
 INTERVAL_SECONDS = 0.001
 """Least time between the end of an unauthenticated request's turn and the next turn, s."""
-REST = 1.0
+PAUSE_RATIO = 1.0
 """Least time between two turns, relative to the duration of a turn: half of the event loop is free for others."""
 PASSES = 2
 """Number of passes of the event loop in which the request of a turn is answered."""
@@ -68,5 +68,5 @@ class Turns:
         if passes:
             loop.call_soon(self._pass, passes - 1, given)
             return
-        self._due = loop.time() + max(INTERVAL_SECONDS, REST * (loop.time() - given))
+        self._due = loop.time() + max(INTERVAL_SECONDS, PAUSE_RATIO * (loop.time() - given))
         self._plan()

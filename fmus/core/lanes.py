@@ -98,8 +98,8 @@ def instructions() -> Instructions:
         The variable names an unknown instruction set, or one that this machine lacks.
     """
     chosen = os.environ.get(CHOICE) or "best"
-    wanted = Instructions.__members__.get(chosen)
-    found = 0 if wanted is None else _functions()[2](wanted)
+    instruction_set = Instructions.__members__.get(chosen)
+    found = 0 if instruction_set is None else _functions()[2](instruction_set)
     if not found:
         has = [name for name, each in Instructions.__members__.items() if each and _functions()[2](each)]
         raise UsageError(f"{CHOICE}: expected one that this machine has ({', '.join(has)}), got {chosen!r}.")

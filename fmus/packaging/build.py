@@ -261,9 +261,9 @@ def _c_files(folder: Path) -> list[Path]:
 
 def _replace(source: Path, target: Path) -> None:
     # a running process may have loaded the old library: write a new file, never overwrite
-    beside = target.with_name(f".{target.name}.new")
-    shutil.copyfile(source, beside)
-    beside.replace(target)
+    temporary = target.with_name(f".{target.name}.new")
+    shutil.copyfile(source, temporary)
+    temporary.replace(target)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -23,11 +23,11 @@ def chosen_platforms(names: str) -> tuple[Platform, ...]:
 
     Raise UsageError for a name that is unknown to FMI, or that nothing can be compiled for.
     """
-    wanted = list(TARGETS) if names.strip() == "all" else [name.strip() for name in names.split(",")]
-    unknown = [name for name in wanted if name not in TARGETS]
+    chosen = list(TARGETS) if names.strip() == "all" else [name.strip() for name in names.split(",")]
+    unknown = [name for name in chosen if name not in TARGETS]
     if unknown:
         raise UsageError(f"platform: expected all, or some of {', '.join(TARGETS)}, got {unknown[0]!r}.")
-    return tuple(Platform(name) for name in dict.fromkeys(wanted))
+    return tuple(Platform(name) for name in dict.fromkeys(chosen))
 
 
 def library_for(component: ComponentDescription, platform: Platform, note: Note = lambda _: None) -> bytes:
@@ -46,9 +46,9 @@ def library_for(component: ComponentDescription, platform: Platform, note: Note 
     zig_compiler()
     note(f"{platform.name}: compiling {component.name}")
     library = compile_component(component, strict=False, platform=platform)
-    beside = kept.with_name(f".{name}.new")
-    beside.write_bytes(library)
-    beside.replace(kept)
+    temporary = kept.with_name(f".{name}.new")
+    temporary.write_bytes(library)
+    temporary.replace(kept)
     return library
 
 

@@ -123,8 +123,8 @@ def export_fmu(
             "`vibroimpact fmu replay recording.nc -o replay.fmu`."
         )
     original = component_of(full_name)
-    asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
-    counts = {block: count for block, count in asked.items() if count is not None}
+    requested = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
+    counts = {block: count for block, count in requested.items() if count is not None}
     _check_counts(original, counts)
 
     def members_with(given: Mapping[str, Start]) -> dict[str, bytes]:

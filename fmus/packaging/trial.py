@@ -80,12 +80,12 @@ def tried(
         }
         answer = _answer(component.name, facts)
     if answer["refusal"]:
-        raise UsageError(f"{component.name}: {_said(answer['refusal'])}. Nothing was written.")
+        raise UsageError(f"{component.name}: {_text_of(answer['refusal'])}. Nothing was written.")
     names = tuple(v.name for v in chosen)
-    return Trial(names, answer["rows"], _said(answer["ended"]), tuple(map(_said, answer["warnings"])))
+    return Trial(names, answer["rows"], _text_of(answer["ended"]), tuple(map(_text_of, answer["warnings"])))
 
 
-def _said(message: str) -> str:
+def _text_of(message: str) -> str:
     """Return a library's log message without the names of instance and function."""
     return message.split(": ", 2)[-1] if message.startswith(f"{INSTANCE}: ") else message
 
@@ -110,7 +110,7 @@ def reference_members(trial: Trial) -> dict[str, bytes]:
     writer.writerows([repr(value) for value in row] for row in trial.rows)
     content = table.getvalue().encode("utf-8")
     first, last = trial.rows[0][0], trial.rows[-1][0]
-    told = f"Outputs from {literal(first)} s to {literal(last)} s at {len(trial.rows)} points, nothing set"
+    summary = f"Outputs from {literal(first)} s to {literal(last)} s at {len(trial.rows)} points, nothing set"
     root = ElementTree.Element(
         "fmiReferences",
         {
@@ -126,7 +126,7 @@ def reference_members(trial: Trial) -> dict[str, bytes]:
         type="text/csv",
         source=RESULT,
         role="result",
-        description=told + (f"; ended there: {trial.ended}" if trial.ended else ""),
+        description=summary + (f"; ended there: {trial.ended}" if trial.ended else ""),
         checksum=hashlib.sha3_256(content).hexdigest().upper(),
     )
     ElementTree.register_namespace("fmi-ls", NAMESPACE)

@@ -35,7 +35,7 @@ class Called:
     """Exit code of its process (negative: the signal)."""
     answer: Any
     """Result of the function, from JSON; None: the process ended without one."""
-    said: str
+    stderr: str
     """Text that the process wrote to its standard error."""
     is_late: bool
     """Whether the call exceeded its time limit."""
@@ -43,7 +43,7 @@ class Called:
     @property
     def last_line(self) -> str:
         """The last line that the process wrote to its standard error, or empty."""
-        return (self.said.strip().splitlines() or [""])[-1]
+        return (self.stderr.strip().splitlines() or [""])[-1]
 
 
 def call(
@@ -74,12 +74,12 @@ def call(
         The process cannot be started.
     """
     with Process(*_CHILD, function, str(seconds), errors=errors, folder=folder) as process:
-        answer, said, is_late = _ended(process, json.dumps(arguments).encode(), seconds)
+        answer, stderr, is_late = _ended(process, json.dumps(arguments).encode(), seconds)
     try:
         found = json.loads(answer)
     except ValueError:  # no answer, or an incomplete one
         found = None
-    return Called(process.returncode, found, said.decode(errors="replace"), is_late)
+    return Called(process.returncode, found, stderr.decode(errors="replace"), is_late)
 
 
 def call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -121,7 +121,7 @@ def _ended(process: Process, order: bytes, seconds: float) -> tuple[bytes, bytes
     try:
         while True:
             try:
-                answer, said = process.communicate(
+                answer, stderr = process.communicate(
                     timeout=max(0.0, min(POLL_SECONDS, end - time.monotonic()))
                 )
             except subprocess.TimeoutExpired as so_far:
@@ -134,7 +134,7 @@ def _ended(process: Process, order: bytes, seconds: float) -> tuple[bytes, bytes
                     process.kill_session()
                     end = math.inf
             else:
-                return answer, said or b"", is_late
+                return answer, stderr or b"", is_late
     finally:
         process.kill_session()
         process.wait()

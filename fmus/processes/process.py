@@ -55,7 +55,7 @@ class Process(subprocess.Popen[bytes]):
         environment: Mapping[str, str] | None = None,
         folder: Path | None = None,
     ) -> None:
-        self._heard = b""
+        self._received = b""
         super().__init__(
             python_command(*arguments),
             stdin=subprocess.PIPE,
@@ -76,14 +76,14 @@ class Process(subprocess.Popen[bytes]):
     def line(self, seconds: float) -> str:
         """Return the next line of its answers; empty if none came in time, or the answers have ended."""
         end = time.monotonic() + seconds
-        while b"\n" not in self._heard:
+        while b"\n" not in self._received:
             if not select.select([self.stdout], [], [], max(end - time.monotonic(), 0.0))[0]:
                 return ""
             part = os.read(self.stdout.fileno(), 4096)
             if not part:
                 return ""
-            self._heard += part
-        line, _, self._heard = self._heard.partition(b"\n")
+            self._received += part
+        line, _, self._received = self._received.partition(b"\n")
         return line.decode(errors="replace").strip()
 
     def lines(self) -> Iterator[str]:

@@ -21,7 +21,7 @@ from vibroimpact.service.routes.described import (
 )
 from vibroimpact.service.routes.scenes import refused_scene
 from vibroimpact.service.scenes import SOURCE, Shelf, Taken, linked, taken_scene, title_of
-from vibroimpact.service.store import ENDED, Asked, Kind, State, Store
+from vibroimpact.service.store import ENDED, Kind, NewJob, State, Store
 from vibroimpact.service.supervisor import Supervisor
 
 MOST_WORKERS = 256
@@ -70,10 +70,10 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         """Accept a scene, to run after those before it. The same `Idempotency-Key` again gives the same job."""
         try:
             taken = taken_scene(given.scene, shelf, given.recordings)
-            asked = _asked(given, taken, shelf)
+            new_job = _new_job(given, taken, shelf)
         except SceneError as error:
             raise refused_scene(error, given.scene) from None
-        return accepted(store, asked, given, response, idempotency_key)
+        return accepted(store, new_job, given, response, idempotency_key)
 
     @router.get(
         "/campaigns", responses=problems(HTTPStatus.UNPROCESSABLE_ENTITY), summary="List, the newest first"
@@ -142,17 +142,17 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
     return router
 
 
-def _asked(given: Submission, taken: Taken, shelf: Shelf) -> Asked:
+def _new_job(given: Submission, taken: Taken, shelf: Shelf) -> NewJob:
     """Return the job for a submission."""
     files, options = dict(taken.files), dict[str, Any]()
     if taken.kind == Kind.replay:
         options = {"fit": given.fit, "score": given.score}
         problems = [line for name in given.score for line in linked("score", name, shelf, files)]
     else:
-        beside = {"fit": given.fit, "score": given.score}
+        unused = {"fit": given.fit, "score": given.score}
         problems = [
             f"{SOURCE}: {name}: expected a scene with [replay] that sweeps nothing but recordings, got another."
-            for name, value in beside.items()
+            for name, value in unused.items()
             if value
         ]
     if given.score and given.fit is None:
@@ -160,4 +160,4 @@ def _asked(given: Submission, taken: Taken, shelf: Shelf) -> Asked:
     if problems:
         raise SceneError(problems)
     title = title_of(given.scene)
-    return Asked(taken.kind, title, taken.text, given.workers, files=files, options=options)
+    return NewJob(taken.kind, title, taken.text, given.workers, files=files, options=options)

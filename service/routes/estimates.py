@@ -17,7 +17,7 @@ from vibroimpact.service.routes.accepting import IdempotencyKey, accepted
 from vibroimpact.service.routes.described import JobAnswer, problems
 from vibroimpact.service.routes.recordings import file_of, known_recording
 from vibroimpact.service.routes.results import dataset_of
-from vibroimpact.service.store import Asked, Kind, Store
+from vibroimpact.service.store import Kind, NewJob, Store
 
 Reference = Annotated[str | None, Field(min_length=1, max_length=200)]
 
@@ -55,8 +55,8 @@ def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
         estimate = given.estimate.model_dump(mode="json")
         options = {"data": name, "asked": estimate}
         title = f"{estimate['kind']} of {name}"
-        asked = Asked(Kind.estimate, title, files={name: file}, options=options)
-        return accepted(store, asked, given, response, idempotency_key)
+        new_job = NewJob(Kind.estimate, title, files={name: file}, options=options)
+        return accepted(store, new_job, given, response, idempotency_key)
 
     return router
 

@@ -191,7 +191,7 @@ def _of_machines() -> Iterator[str]:
 
 
 def _cell_of_machine(machine: Machine, host: Path, name: str, fmi: str, folder: Path) -> Cell:
-    it = made(name, fmi, folder, machine.asked_for)
+    it = made(name, fmi, folder, machine.export_platform)
     try:
         rows = machine.run(host, it.path, it.outputs, it.step, len(it.rows))
     except HostFailedError as error:

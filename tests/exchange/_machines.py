@@ -63,7 +63,7 @@ class Machine:
         return ""
 
     @property
-    def asked_for(self) -> str | None:
+    def export_platform(self) -> str | None:
         """Platform of the export; None, for the library built on this machine, if zig is not installed."""
         return self.platform.name if self.runner or importlib.util.find_spec("ziglang") else None
 
@@ -71,8 +71,8 @@ class Machine:
         """Return its name with its emulator."""
         if not self.runner:
             return self.platform.name
-        said = subprocess.run([self.runner, "--version"], capture_output=True, text=True).stdout
-        version = re.search(r"\d+\.[\d.]*\d", said)
+        text = subprocess.run([self.runner, "--version"], capture_output=True, text=True).stdout
+        version = re.search(r"\d+\.[\d.]*\d", text)
         return f"{self.platform.name} ({self.runner} {version[0] if version else ''})"
 
     def _libraries(self) -> Path:

@@ -31,7 +31,7 @@ VERSIONS = {"FMPy": ("2.0", "3.0"), "CasADi": ("2.0", "3.0"), "PyFMI": ("2.0", "
 """Tools that report the number of their steps."""
 
 
-def fmpy(asked: Request) -> Rows:
+def fmpy(request: Request) -> Rows:
     """Count the steps of FMPy's CVode."""
     import ctypes
 
@@ -48,12 +48,12 @@ def fmpy(asked: Request) -> Rows:
     usual, sundials.CVodeSolver = sundials.CVodeSolver, Kept
     try:
         simulate_fmu(
-            asked["fmu"],
+            request["fmu"],
             fmi_type="ModelExchange",
             solver="CVode",
-            relative_tolerance=asked["tolerance"],
-            stop_time=asked["stop_time"],
-            output_interval=asked["stop_time"],
+            relative_tolerance=request["tolerance"],
+            stop_time=request["stop_time"],
+            output_interval=request["stop_time"],
         )
     finally:
         sundials.CVodeSolver = usual
@@ -62,33 +62,33 @@ def fmpy(asked: Request) -> Rows:
     return [[float(steps.value)]]
 
 
-def casadi(asked: Request) -> Rows:
+def casadi(request: Request) -> Rows:
     """Count the steps of CasADi's CVodes."""
     import casadi as ca
 
     folder = Path("unpacked")
-    with zipfile.ZipFile(asked["fmu"]) as archive:
+    with zipfile.ZipFile(request["fmu"]) as archive:
         archive.extractall(folder)
     dae = ca.DaeBuilder("chain", str(folder.absolute()))
     dynamics = dae.create("dynamics", ["t", "x"], ["ode"])
     t, x = ca.MX.sym("t"), ca.MX.sym("x", len(dae.x()))
     problem = {"t": t, "x": x, "ode": dynamics(t, x)}
-    options = {"reltol": asked["tolerance"], "abstol": asked["tolerance"] * 1e-2, "max_num_steps": 10**7}
-    flight = ca.integrator("flight", "cvodes", problem, 0.0, asked["stop_time"], options)
+    options = {"reltol": request["tolerance"], "abstol": request["tolerance"] * 1e-2, "max_num_steps": 10**7}
+    flight = ca.integrator("flight", "cvodes", problem, 0.0, request["stop_time"], options)
     flight(x0=dae.start(dae.x()))
     return [[float(flight.stats()["nsteps"])]]
 
 
-def pyfmi(asked: Request) -> Rows:
+def pyfmi(request: Request) -> Rows:
     """Count the steps of PyFMI's CVode."""
     from pyfmi import load_fmu
 
-    model = load_fmu(asked["fmu"], kind="me")
+    model = load_fmu(request["fmu"], kind="me")
     options = model.simulate_options()
     options["ncp"] = 1
     options["result_handling"] = "binary"
-    options["CVode_options"] |= {"rtol": asked["tolerance"], "verbosity": 50}
-    found = model.simulate(final_time=asked["stop_time"], options=options)
+    options["CVode_options"] |= {"rtol": request["tolerance"], "verbosity": 50}
+    found = model.simulate(final_time=request["stop_time"], options=options)
     return [[float(found.solver.statistics["nsteps"])]]
 
 

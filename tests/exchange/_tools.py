@@ -96,14 +96,14 @@ class Tool:
             "there = importlib.util.find_spec(sys.argv[1])\n"
             "print(m.version(sys.argv[1]) if there else '')"
         )
-        return _said_by([self.python, "-c", code, self.package]).strip()
+        return _output_of([self.python, "-c", code, self.package]).strip()
 
     def _version_of_program(self) -> str:
-        found = re.search(r"v?(\d+\.\d[\w.]*)", _said_by([str(self.path()), "--version"]))
+        found = re.search(r"v?(\d+\.\d[\w.]*)", _output_of([str(self.path()), "--version"]))
         return found[1] if found else ""
 
 
-def _said_by(command: Sequence[str]) -> str:
+def _output_of(command: Sequence[str]) -> str:
     return subprocess.run(command, capture_output=True, text=True, timeout=LIMIT).stdout
 
 
@@ -177,15 +177,15 @@ def run(tool: Tool, fmu: Path, names: Sequence[str], step: float, count: int, fo
     ToolFailedError
         The tool gave no values.
     """
-    return _asked(tool, {"fmu": str(fmu), "names": list(names), "step": step, "count": count}, folder)
+    return _answer(tool, {"fmu": str(fmu), "names": list(names), "step": step, "count": count}, folder)
 
 
 def run_integrated(
     tool: Tool, fmu: Path, names: Sequence[str], step: float, count: int, folder: Path, tolerance: float
 ) -> Answer:
     """Return a tool's results with an FMU for model exchange, integrated at a relative tolerance."""
-    asked = {"fmu": str(fmu), "names": list(names), "step": step, "count": count, "tolerance": tolerance}
-    return _asked(tool, asked, folder)
+    order = {"fmu": str(fmu), "names": list(names), "step": step, "count": count, "tolerance": tolerance}
+    return _answer(tool, order, folder)
 
 
 def steps_of(tool: Tool, fmu: Path, folder: Path, stop_time: float, tolerance: float) -> int:
@@ -196,7 +196,7 @@ def steps_of(tool: Tool, fmu: Path, folder: Path, stop_time: float, tolerance: f
     ToolFailedError
         The tool gave no number, or warned.
     """
-    answer = _asked(tool, {"fmu": str(fmu), "stop_time": stop_time, "tolerance": tolerance}, folder)
+    answer = _answer(tool, {"fmu": str(fmu), "stop_time": stop_time, "tolerance": tolerance}, folder)
     if answer.complaints:
         raise ToolFailedError("\n".join(answer.complaints))
     return round(answer.rows[0][0])
@@ -212,8 +212,8 @@ def run_coupled(
     folder: Path,
 ) -> Answer:
     """Return a tool's results with coupled FMUs; `names` and `connections` are in the form `component.variable`."""
-    asked = {"fmus": {name: str(path) for name, path in fmus.items()}, "connections": list(connections)}
-    return _asked(tool, {**asked, "names": list(names), "step": step, "count": count}, folder)
+    order = {"fmus": {name: str(path) for name, path in fmus.items()}, "connections": list(connections)}
+    return _answer(tool, {**order, "names": list(names), "step": step, "count": count}, folder)
 
 
 def run_system(
@@ -224,31 +224,31 @@ def run_system(
         inside = [name for name in archive.namelist() if name.endswith(".fmu")]
         fmus = {Path(name).stem: archive.extract(name, folder) for name in inside}
         description = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
-    asked = {"system": str(system), "model": description.get("name"), "fmus": fmus}
-    return _asked(tool, {**asked, "names": list(names), "step": step, "count": count}, folder)
+    order = {"system": str(system), "model": description.get("name"), "fmus": fmus}
+    return _answer(tool, {**order, "names": list(names), "step": step, "count": count}, folder)
 
 
-def _asked(tool: Tool, request: Mapping[str, Any], folder: Path) -> Answer:
+def _answer(tool: Tool, request: Mapping[str, Any], folder: Path) -> Answer:
     answer = folder / "answer.json"
     answer.unlink(missing_ok=True)
-    asked = {
+    order = {
         **request,
         "tool": tool.name,
         "program": tool.path() if tool.program else "",
         "answer": str(answer),
     }
     done = subprocess.run(
-        [tool.python, "-m", "exchange._drive", json.dumps(asked)],
+        [tool.python, "-m", "exchange._drive", json.dumps(order)],
         capture_output=True,
         text=True,
         timeout=LIMIT,
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT / "tests")},
     )
-    said = f"{done.stdout}\n{done.stderr}"
+    text = f"{done.stdout}\n{done.stderr}"
     if not answer.is_file():
-        raise ToolFailedError(f"{tool.name} gave nothing: {said.strip()[-1000:]}")
-    lines = (line.strip() for line in said.splitlines())
-    told = (line for line in lines if not COUNTS.search(line) and not OF_ITSELF.search(line))
-    complaints = tuple(line for line in told if WARNING.search(line))
+        raise ToolFailedError(f"{tool.name} gave nothing: {text.strip()[-1000:]}")
+    lines = (line.strip() for line in text.splitlines())
+    candidates = (line for line in lines if not COUNTS.search(line) and not OF_ITSELF.search(line))
+    complaints = tuple(line for line in candidates if WARNING.search(line))
     return Answer(json.loads(answer.read_text()), complaints)

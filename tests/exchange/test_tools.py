@@ -76,8 +76,8 @@ def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Pat
     tool = next(tool for tool in TRIED if tool.name == "FMPy")
     skip_where_missing(tool)
     it = made(name, "2.0", tmp_path).integrated(STEPS[name])
-    asked = (tool, it.path, it.outputs, it.step, len(it.rows), tmp_path)
-    found = [np.array(run_integrated(*asked, tolerance).rows) for tolerance in TOLERANCES]
+    arguments = (tool, it.path, it.outputs, it.step, len(it.rows), tmp_path)
+    found = [np.array(run_integrated(*arguments, tolerance).rows) for tolerance in TOLERANCES]
     errors = [difference(rows[it.quiet], it.rows[it.quiet]) for rows in found]
     judged = [
         (error, tolerance) for error, tolerance in zip(errors, TOLERANCES, strict=True) if tolerance < USUAL

@@ -50,8 +50,8 @@ def model_description(
         "variableNamingConvention": "structured",
     }
     if edition is not None:
-        told = {"copyright": "vibroimpact developers", "generationDateAndTime": edition.date_and_time}
-        head |= {"version": edition.version, **_present(told)}
+        origin = {"copyright": "vibroimpact developers", "generationDateAndTime": edition.date_and_time}
+        head |= {"version": edition.version, **_present(origin)}
     root = Element("fmiModelDescription", identity | head)
     if version == 2 and component.model_exchange:
         root.set("numberOfEventIndicators", str(len(component.event_indicators())))

@@ -40,7 +40,7 @@ _MOST_ROUNDS, _MOST_ERRORS = 20, 1000
 #: Number of an element's children that the schema checks at a time.
 _WINDOW = 500
 #: Number of refusals in the answer; characters of a name for comparison with the schema, or of a quoted value.
-_MOST_TOLD, _LONGEST = 10, 80
+_MOST_REFUSALS, _LONGEST = 10, 80
 _BOOLEAN = "'xs:boolean'"
 _ATTRIBUTE = re.compile(r"attribute '([^']+)'")
 
@@ -62,7 +62,7 @@ def build_problems(content: bytes, schemas: Path) -> tuple[str, ...]:
     schema = _schema(schemas / "fmi3", "BuildDescription")
     if schema.validate(root):
         return ()
-    return tuple(f"line {e.line}: {_cut_message(e.message)}" for e in list(schema.error_log)[:_MOST_TOLD])
+    return tuple(f"line {e.line}: {_cut_message(e.message)}" for e in list(schema.error_log)[:_MOST_REFUSALS])
 
 
 @cache
@@ -162,7 +162,7 @@ class _Amendments:
                 break
         else:
             left = [error for error, _ in self._errors()]
-        for error in left[:_MOST_TOLD]:
+        for error in left[:_MOST_REFUSALS]:
             self._findings.add(Grade.refused, f"line {error.line}: {_cut_message(error.message)}")
         self._root.extend(self._moved)
 

@@ -149,8 +149,8 @@ def _amend_initial(variable: Variable, findings: Findings) -> None:
     variable.initial = default
     settable = variable.causality in ("parameter", "structuralParameter")
     meant = "Read as exact: a value that is given to it may be lost." if settable else "It is not looked at."
-    beside = f"causality {variable.causality} and variability {variable.variability}"
-    text = f"expected no initial = {written} beside {beside}."
+    properties = f"causality {variable.causality} and variability {variable.variability}"
+    text = f"expected no initial = {written} beside {properties}."
     findings.add(Grade.doubt if settable else Grade.remark, f"{text} {meant}", variable.name)
 
 

@@ -26,9 +26,9 @@ from pythonfmu.enums import (  # type: ignore[import-untyped, import-not-found, 
 PLAN_FILE = "plan.json"
 TURN = 2.0 * math.pi
 #: Deviation of a flight's duration, or of an impact's phase, from the orbit's, beyond which the orbit is lost; periods.
-LOST = 0.25
+LARGEST_DEVIATION = 0.25
 #: Difference of two speeds below which they count as equal, in standard deviations of the noise.
-NOISES = 4.0
+NOISE_DEVIATIONS = 4.0
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
             kept = kept and self._is_orbit(before, time, phase)
             if self._locates:
                 offset = self._located(before, phase, velocity)
-            still = max(self.tolerance, NOISES * self.noise * velocity)
+            still = max(self.tolerance, NOISE_DEVIATIONS * self.noise * velocity)
             settled = flights >= self._stay and abs(velocity - before.velocity) < still
             if kept and settled and row + 1 < len(self._rows):
                 row, flights = row + 1, 0
@@ -200,7 +200,7 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
         orbit = self._rows[before.row]
         periods = (time - before.time) * orbit["angular_frequency"] / TURN
         turned = math.remainder(phase - orbit["phase"], TURN) / TURN
-        return abs(periods - self._periods) < LOST and abs(turned) < LOST
+        return abs(periods - self._periods) < LARGEST_DEVIATION and abs(turned) < LARGEST_DEVIATION
 
     def _located(self, before: Decision, phase: float, velocity: float) -> tuple[float, float]:
         """Return the fixed point by one step of Newton's method, from the start and the end of the last flight.

@@ -137,16 +137,16 @@ def test_a_fork_that_waits_for_a_lock_of_a_lost_thread_is_given_up(
     monkeypatch.setattr(reader_fork, "PATIENCE_WITH_SLEEP", 0.5)
     lock = threading.Lock()
     with lock:
-        asked = time.monotonic()
+        began = time.monotonic()
         assert read(lambda path, options: lock.acquire(), seconds=100.0) is None
-    assert time.monotonic() - asked < 60.0
+    assert time.monotonic() - began < 60.0
 
 
 def test_a_fork_that_computes_or_answers_slowly_is_not_given_up(
     read: Callable[..., Answer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reader_fork, "PATIENCE_WITH_SLEEP", 0.1)
-    monkeypatch.setattr(reader_fork, "_GLANCE", 0.02)
+    monkeypatch.setattr(reader_fork, "_WATCH_INTERVAL", 0.02)
 
     def work(path: str, options: dict[str, Any]) -> tuple[None, list[bytes]]:
         until = time.process_time() + 0.5

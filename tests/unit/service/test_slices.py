@@ -122,10 +122,10 @@ def test_a_map_can_be_of_what_plot_draws_maps_of(file: Path) -> None:
             assert np.isfinite(found).any()
             np.testing.assert_array_equal(found, runs)
         names = [one.name for one in classify(dataset)]
-    told = answers["class"]
-    assert [told["classes"][int(place)] for place in told["value"]] == names
+    answer = answers["class"]
+    assert [answer["classes"][int(place)] for place in answer["value"]] == names
     assert {"P(1,1)"} < set(names), "motions of several classes"
-    counts = [names.count(name) for name in told["classes"]]
+    counts = [names.count(name) for name in answer["classes"]]
     assert counts == sorted(counts, reverse=True)
     assert answers["largest_impact_velocity"]["classes"] == []
 

@@ -118,10 +118,10 @@ def test_a_number_that_is_no_laws_is_an_error_at_the_start(
     fmu = ComponentFmu(name, {variable: number}, version=version, initialize=False)
     with fmu, pytest.raises(FMICallException):
         fmu.initialize(0.0)
-    (said,) = [message for message in fmu.messages if "expected" in message]
-    assert f"{variable}: expected " in said
-    assert all(f"{law.number} ({law.name})" in said for law in OWN)
-    assert said.endswith(f", got {number}")
+    (message,) = [message for message in fmu.messages if "expected" in message]
+    assert f"{variable}: expected " in message
+    assert all(f"{law.number} ({law.name})" in message for law in OWN)
+    assert message.endswith(f", got {number}")
 
 
 def test_a_name_or_number_that_the_core_has_no_law_of_is_an_error() -> None:
@@ -137,7 +137,7 @@ def test_a_row_of_the_table_in_another_form_is_an_error_of_the_build(tmp_path: P
         contact_laws()
     )
     table = tmp_path / "contact_law.c"
-    for before, after, said in (
+    for before, after, message in (
         (
             '{.name = "hertz",',
             '{.stop = VI_YIELDING_STOP, .name = "hertz",',
@@ -149,5 +149,5 @@ def test_a_row_of_the_table_in_another_form_is_an_error_of_the_build(tmp_path: P
     ):
         assert text.count(before) == 1
         table.write_text(text.replace(before, after), encoding="utf-8")
-        with pytest.raises(ComponentFileError, match=said):
+        with pytest.raises(ComponentFileError, match=message):
             read_laws(table)

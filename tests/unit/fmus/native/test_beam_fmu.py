@@ -269,11 +269,11 @@ def test_unforced_beams_of_all_kinds_lose_energy_to_every_law_of_contact(boundar
 
 
 def test_modal_energies_are_only_worked_out_when_asked_for() -> None:
-    for asked in (False, True):
-        with beam({**STRUCK, "record.energies": asked}) as b:
+    for recorded in (False, True):
+        with beam({**STRUCK, "record.energies": recorded}) as b:
             b.step(0.01)
             total = b.get_each("modal_energy[{}]", 4).sum()
-            assert total == pytest.approx(energy(b) if asked else 0.0, rel=SEQUENCE)
+            assert total == pytest.approx(energy(b) if recorded else 0.0, rel=SEQUENCE)
 
 
 # ---- warnings ----

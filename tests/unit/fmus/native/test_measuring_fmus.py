@@ -200,7 +200,7 @@ def test_an_edge_at_the_start_is_the_first_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("component", "parameters", "said"),
+    ("component", "parameters", "message"),
     [
         ("Sensor", {"gain": math.nan}, "gain: expected a finite number, got"),
         ("Sensor", {"range": -1.0}, "range: expected a finite number >= 0, got -1"),
@@ -217,13 +217,13 @@ def test_an_edge_at_the_start_is_the_first_sample() -> None:
 )  # fmt: skip
 @pytest.mark.parametrize("version", VERSIONS)
 def test_parameters_that_mean_nothing_are_refused_by_name(
-    component: str, parameters: dict[str, float], said: str, version: str
+    component: str, parameters: dict[str, float], message: str, version: str
 ) -> None:
     fmu = ComponentFmu(component, parameters, version=version, initialize=False)
     try:
         with pytest.raises(Exception, match="Initialization"):
             fmu.initialize()
-        assert said in fmu.messages[-1]
+        assert message in fmu.messages[-1]
     finally:
         fmu.free()
 

@@ -411,8 +411,8 @@ def test_damaged_signal_files_are_refused_by_name(
 
     with pytest.raises(Exception, match=r"nstanti|fmi3ExitInitializationMode"):
         Failing(changed(pair, tmp_path / "x.fmu", damage)).free()
-    (told,) = messages
-    assert message in told
+    (text,) = messages
+    assert message in text
 
 
 def test_the_component_without_a_recording_says_how_to_make_one(tmp_path: Path) -> None:
@@ -461,8 +461,8 @@ def test_the_command_makes_an_fmu_in_si_units(
 ) -> None:
     source = recording(tmp_path)
     assert exit_code("fmu", "replay", source, "--channel", "base", "--si", "-o", tmp_path / "a.fmu") == 0
-    assert "base: 50 samples in m s-2" in (told := capsys.readouterr().out)
-    assert "2 missing" in told
+    assert "base: 50 samples in m s-2" in (text := capsys.readouterr().out)
+    assert "2 missing" in text
     variables = {v.name: v.unit for v in read_description(tmp_path / "a.fmu").modelVariables}
     assert variables["base"] == "m/s2"
     assert not [name for name in variables if name.startswith("board")]

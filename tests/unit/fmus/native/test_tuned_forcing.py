@@ -184,7 +184,7 @@ MOVING = (
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("component", ["Oscillator", "Chain", "Beam"])
 @pytest.mark.parametrize(
-    ("frequency", "name", "value", "said"),
+    ("frequency", "name", "value", "message"),
     [
         (1.0, "forcing.angular_frequency", 0.0, MOVING + "0"),
         (1.0, "forcing.angular_frequency", -1.0, MOVING + "-1"),
@@ -201,7 +201,7 @@ MOVING = (
     ],
 )
 def test_a_forcing_that_no_body_can_go_on_with_is_refused(
-    component: str, frequency: float, name: str, value: float, said: str, version: str
+    component: str, frequency: float, name: str, value: float, message: str, version: str
 ) -> None:
     index = "[1]" if component == "Chain" else ""
     name = name + index if name.endswith("amplitude") else name
@@ -211,23 +211,23 @@ def test_a_forcing_that_no_body_can_go_on_with_is_refused(
         body.set(name, value)
         with pytest.raises(FMICallException):
             body.step(0.1)
-        assert said.format(index) in body.messages[-1]
+        assert message.format(index) in body.messages[-1]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("component", ["Oscillator", "Chain"])
 def test_a_base_that_is_no_number_is_refused_at_the_start_and_later(component: str, version: str) -> None:
-    said = "forcing.base_acceleration: expected a finite number, got inf"
+    message = "forcing.base_acceleration: expected a finite number, got inf"
     with ComponentFmu(component, {"forcing.angular_frequency": 1.0}, version=version) as body:
         body.set("forcing.base_acceleration", math.inf)
         with pytest.raises(FMICallException):
             body.step(0.1)
-        assert said in body.messages[-1]
+        assert message in body.messages[-1]
     base = {"forcing.base_acceleration": math.inf}
     with ComponentFmu(component, base, version=version, initialize=False) as body:
         with pytest.raises(FMICallException):
             body.initialize()
-        assert said in body.messages[-1]
+        assert message in body.messages[-1]
 
 
 def test_a_base_shaken_at_a_phase_carries_a_free_mass_along() -> None:

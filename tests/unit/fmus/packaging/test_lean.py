@@ -169,8 +169,8 @@ def test_start_values_of_an_export_are_those_of_the_description_and_of_the_binar
         for _ in range(2):
             assert {name: fmu.get(name) for name in described} == described
             fmu.fmu.reset()
-    wanted = {**starts, "contact[1].law": 1, "contact[1].side": 2}
-    assert {name: described[name] for name in wanted} == wanted
+    expected = {**starts, "contact[1].law": 1, "contact[1].side": 2}
+    assert {name: described[name] for name in expected} == expected
     assert described["displacement_start"] == 0.0
 
 
@@ -234,7 +234,7 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
 
 
 @pytest.mark.parametrize(
-    ("starts", "said"),
+    ("starts", "text"),
     [
         ({"mas": 2.0}, "mas: expected a parameter or an input, got none of this name. Did you mean mass?"),
         ({"mass": -1.0}, "mass: expected a number >= 0, got -1.0."),
@@ -250,15 +250,15 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
         ({"record.impacts": "perhaps"}, "record.impacts: expected true or false, got 'perhaps'."),
     ],
 )
-def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[str, Any], said: str) -> None:
+def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[str, Any], text: str) -> None:
     with pytest.raises(UsageError) as caught:
         export_fmu("oscillator", tmp_path / "o.fmu", starts=starts)
-    assert said in str(caught.value)
+    assert text in str(caught.value)
     assert not (tmp_path / "o.fmu").exists()
 
 
 @pytest.mark.parametrize(
-    ("name", "starts", "said"),
+    ("name", "starts", "message"),
     [
         ("oscillator", {"mass": 0.0}, "Oscillator: mass: expected a finite number > 0, got 0."),
         ("impact_stop", {"law": "hertz"}, "ImpactStop: stiffness: expected a finite number > 0, got 0."),
@@ -268,12 +268,12 @@ def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[st
 )
 @pytest.mark.parametrize("full", [False, True])
 def test_start_values_that_the_library_refuses_are_not_written(
-    tmp_path: Path, name: str, starts: dict[str, Any], said: str, full: bool
+    tmp_path: Path, name: str, starts: dict[str, Any], message: str, full: bool
 ) -> None:
     with pytest.raises(UsageError) as caught:
         export_fmu(name, tmp_path / "x.fmu", starts=starts, full=full)
     (line,) = str(caught.value).splitlines()
-    assert line.startswith(said)
+    assert line.startswith(message)
     assert line.endswith("Nothing was written.")
     assert not list(tmp_path.iterdir())
 

@@ -148,10 +148,10 @@ def test_a_run_that_ends_early_is_kept_as_far_as_it_goes(tmp_path: Path) -> None
 
 
 def test_what_the_library_warns_of_is_told(tmp_path: Path) -> None:
-    told: list[str] = []
+    notes: list[str] = []
     starts = {"thickness": 0.02}
-    export_fmu("beam", tmp_path / "x.fmu", starts=starts, note=told.append)
-    (line,) = told
+    export_fmu("beam", tmp_path / "x.fmu", starts=starts, note=notes.append)
+    (line,) = notes
     assert line.startswith("Beam: modes: mode ")
     assert "Euler-Bernoulli" in line
 
