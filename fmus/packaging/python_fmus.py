@@ -180,7 +180,7 @@ def _build(*words: str, parts: PythonFmu) -> None:
     if done.is_late:
         raise ComponentFileError(f"{parts.blamed}: expected to run within {BUILD_LIMIT:g} s, got no answer.")
     if done.code != 0:
-        raise ComponentFileError(f"{parts.blamed}: {_last_message(done.said)}")
+        raise ComponentFileError(f"{parts.blamed}: {_last_message(done.stderr)}")
 
 
 def _last_message(errors: str) -> str:

@@ -104,8 +104,8 @@ def _of_integrated() -> Iterator[str]:
 def _cell_of_integrated(tool: Tool, fmi: str, name: str, tolerance: float) -> Cell:
     with tempfile.TemporaryDirectory() as folder:
         it = made(name, fmi, Path(folder)).integrated(_model_exchange.STEPS[name])
-        asked = (tool, it.path, it.outputs, it.step, len(it.rows), Path(folder), tolerance)
-        return _cell(run_integrated, it.rows, *asked, rows=it.quiet)
+        arguments = (tool, it.path, it.outputs, it.step, len(it.rows), Path(folder), tolerance)
+        return _cell(run_integrated, it.rows, *arguments, rows=it.quiet)
 
 
 def _of_stiff() -> Iterator[str]:
@@ -243,8 +243,8 @@ def _row_of_pair(tool: Tool, fmi: str, names: list[str]) -> Iterator[Cell]:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             it = made_pair(name, tool, fmi, Path(folder))
-            asked = (tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, Path(folder))
-            yield _cell(run_coupled, it.rows, *asked)
+            arguments = (tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, Path(folder))
+            yield _cell(run_coupled, it.rows, *arguments)
 
 
 def _cell(

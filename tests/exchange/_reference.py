@@ -71,12 +71,12 @@ def imported(path: Path, folder: Path) -> float | str:
         return f"refused: {str(error).splitlines()[0].rpartition(': ')[2]}"
     if not compared:
         return "runs; nothing to compare"
-    wanted = expected[:, [0, *(names.index(name) for name in compared)]]
+    chosen = expected[:, [0, *(names.index(name) for name in compared)]]
     # an FMU may ask to end before its experiment does; for a sample at an event both sides are right
     ours = {round(time, 9): row for time, *row in rows if not np.any(np.abs(events - time) <= 1e-9)}
-    pairs = [(ours[round(time, 9)], row) for time, *row in wanted if round(time, 9) in ours]
-    if len(pairs) < len(wanted) / 2:
-        return f"{len(pairs)} of {len(wanted)} rows"
+    pairs = [(ours[round(time, 9)], row) for time, *row in chosen if round(time, 9) in ours]
+    if len(pairs) < len(chosen) / 2:
+        return f"{len(pairs)} of {len(chosen)} rows"
     got, there = np.array(pairs).transpose(1, 0, 2)
     return float(np.max(np.abs(got - there) / np.maximum(np.abs(there).max(axis=0), 1e-300)))
 
@@ -98,8 +98,8 @@ def _scalars(description: ModelDescription) -> list[str]:
     def is_number(variable: ScalarVariable) -> bool:
         return variable.type not in ("String", "Binary", "Clock") and not variable.dimensions
 
-    wanted = [v for v in description.modelVariables if v.causality != "independent" and is_number(v)]
-    return [v.name for v in sorted(wanted, key=lambda v: v.causality not in ("output", "local"))]
+    chosen = [v for v in description.modelVariables if v.causality != "independent" and is_number(v)]
+    return [v.name for v in sorted(chosen, key=lambda v: v.causality not in ("output", "local"))]
 
 
 def _result(path: Path) -> Table:
