@@ -31,7 +31,7 @@ class Either(NamedTuple):
 CALL = Either("call", "command")
 """The noun for the request: `The same call resumes.`"""
 WITH_OUTPUT = Either("", " with -o")
-"""The hint how to choose another file or folder."""
+"""The hint for the choice of another file or folder."""
 
 
 class Argument(NamedTuple):
