@@ -1,4 +1,4 @@
-"""What is found out about a scene before it runs: how many modes it takes, and how large its errors are."""
+"""The preparation of a scene before it runs: its number of modes, and its estimated error."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from vibroimpact.orchestrator.study.references import observed, reference_of
 from vibroimpact.orchestrator.study.swept_modes import SweepPlaces, modes_of_sweep
 
 TOLD = 3
-"""Points at which no number of modes meets a tolerance that are told; all of them are in the dataset."""
+"""Most points that a note names where no number of modes meets the tolerance; the dataset has all of them."""
 
 
 def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
-    """Return a scene that is ready to run, with what was found out about it.
+    """Return a scene that is ready to run, with its number of modes and its estimated error.
 
-    A scene without `execution.tolerance` is ready as it is. Else `modes = "auto"` becomes the fewest modes that meet
-    it at points of the sweep (`swept_modes.modes_of_sweep`), and the error of what is recorded is estimated: that of
-    the number of modes at those points, where it was found here, and that of the solution (`references.reference_of`)
-    at the ends of the sweep and in its middle. All of this follows from the scene alone and is the same in every run,
-    on every machine; so a campaign that is resumed has the modes with which it began.
+    A scene without `execution.tolerance` stays as it is. With a tolerance, `modes = "auto"` becomes the fewest modes
+    that meet the tolerance at points of the sweep (`swept_modes.modes_of_sweep`). The estimated error adds two parts.
+    The error of the number of modes counts where that number was found here. The error of the solution
+    (`references.reference_of`) is estimated at the ends and in the middle of the sweep. The result depends only on the
+    scene, on every machine: a resumed campaign has the modes with which it began.
 
     Parameters
     ----------
     scene : Scene
     note : callable
-        Told what was found, a line at a time.
+        Receives the results, a line at a time.
 
     Returns
     -------
@@ -76,12 +76,12 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
 
 
 def with_found_modes(scene: Scene, note: Note = lambda text: None) -> Scene:
-    """Return a scene with `modes = "auto"` replaced by the fewest that meet its tolerance; others as they are.
+    """Return a scene with `modes = "auto"` replaced by the fewest modes that meet its tolerance; others unchanged.
 
     Raises
     ------
     SceneError
-        No number of modes meets it.
+        No number of modes meets the tolerance.
     """
     tolerance = scene.execution.tolerance
     if tolerance is None or not _finds_modes(scene):
@@ -113,7 +113,7 @@ def with_found_modes(scene: Scene, note: Note = lambda text: None) -> Scene:
 
 
 def round_off(error: float) -> float | str:
-    """Return an error with three digits, as JSON has it.
+    """Return an error with three digits as a value for JSON.
 
     >>> round_off(0.00123456), round_off(float("inf"))
     (0.00123, 'another motion')
@@ -122,10 +122,10 @@ def round_off(error: float) -> float | str:
 
 
 def _what(points: int, of_modes: int, told: int) -> str:
-    """Return what an error is estimated of, in words.
+    """Return the parts of the estimated error, in words.
 
-    `points` counts those of the sweep at which the solution was looked at, `told` those whose motion is not chaotic.
-    `of_modes` counts those at which numbers of modes were compared; 0 where none were.
+    `points` is the number of points of the sweep with a solution, `told` the number whose motion is not chaotic.
+    `of_modes` is the number of points at which numbers of modes were compared; 0 where there was no comparison.
     """
     parts = [
         *([f"the number of modes{_largest(of_modes)}"] if of_modes else []),
@@ -149,7 +149,7 @@ def _finds_modes(scene: Scene) -> bool:
 
 
 def _error_of_solution(scene: Scene, run: Observation) -> float:
-    """Return the estimated error of how the motion of a scene is solved for; NaN where it is chaotic."""
+    """Return the estimated error of the solution of a scene's motion; NaN where the motion is chaotic."""
     reference = reference_of(scene)
     if reference.chaotic:
         return math.nan

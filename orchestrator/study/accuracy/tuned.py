@@ -1,4 +1,4 @@
-"""A scene file with the settings of a way, written beside what it was; its comments and its order stay."""
+"""A scene file with the settings of a way; its comments and the order of its tables stay."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ _NEXT_HEADER = re.compile(r"^[ \t]*\[", re.MULTILINE)
 
 
 def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
-    """Return a scene's TOML with other keys in `[execution]`, given without its name, and why as a comment above them.
+    """Return a scene's TOML with new settings in `[execution]`, and the reason as a comment above them.
 
-    Where the table is written in a way that lines cannot be put into, all of the text is written anew.
+    The whole text is written anew where lines cannot be inserted into the table. `settings` have keys without the
+    name of the table.
 
     Examples
     --------
@@ -46,5 +47,5 @@ def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
         if parse_toml(found) == wanted:
             return found
     except ValueError:
-        pass  # a key of several lines, or of another form: written anew below
+        pass  # the table has a key of several lines or another form: all of the text is written anew
     return "\n".join(f"# {line}" for line in reason.splitlines()) + "\n" + tomli_w.dumps(wanted)

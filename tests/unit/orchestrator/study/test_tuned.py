@@ -1,4 +1,4 @@
-"""A scene with other settings keeps its comments and its order, and says what was asked for."""
+"""A scene with new settings keeps its comments and its order, and names the reason of the settings."""
 
 from __future__ import annotations
 
