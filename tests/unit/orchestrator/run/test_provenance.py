@@ -1,4 +1,4 @@
-"""Where a dataset comes from, and what finding that out takes."""
+"""The origin of a dataset, and the cost of finding it."""
 
 from __future__ import annotations
 
