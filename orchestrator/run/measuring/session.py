@@ -55,7 +55,7 @@ class MeasuredSession:
     -----
     Steps are cut into `RING_INSTANTS` pieces in a period of the load cell's ring, with a linear force on the cell
     between them. A long step is cut only at its end, until the cell's start state has decayed, into 5000 pieces at
-    most. Steps of a cell behind a rigid stop are not cut: half sines are exact at any step, and a resting body presses
+    most. Steps of a cell behind a rigid stop are not cut. Half sines are exact at any step, and a resting body presses
     linearly over a step. The cut of samples into blocks makes no difference, unless more than 1000 impacts are within
     a contact_duration.
 

@@ -1,4 +1,4 @@
-"""A scene as a function: its arrays are those of runs and campaigns, and what it cannot take it refuses as they do."""
+"""A scene as a function: its arrays equal those of runs and campaigns, and it refuses the same values."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_one_point_is_the_run_of_its_scene_and_many_are_a_sweep_over_them(name: 
 
 
 def in_order_of_runs(sweep: xr.Dataset) -> xr.Dataset:
-    """Return a sweep along one dimension in the order of its runs: one key alone ascends."""
+    """Return a sweep along one dimension in the order of its runs; a file has its single key ascending."""
     return sweep.isel({sweep.run_id.dims[0]: np.argsort(sweep.run_id.values)})
 
 

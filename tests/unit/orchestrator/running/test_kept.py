@@ -1,4 +1,4 @@
-"""Scenes that stay open: who runs one again finds it open, and what it was before makes no difference."""
+"""Scenes that stay open: a second run finds the scene open, and earlier runs make no difference."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TEXT = frequency_text(2).partition("[sweep]")[0]
 
 @pytest.fixture(autouse=True)
 def none_kept() -> Iterator[None]:
-    """Begin and end without an open scene."""
+    """Begin and end each test without an open scene."""
     kept._kept.close()
     yield
     kept._kept.close()
@@ -31,7 +31,7 @@ def none_kept() -> Iterator[None]:
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[PointRunner]:
-    """Return the runners that are opened, as they come."""
+    """Return the list of opened runners, in the order of opening."""
     runners: list[PointRunner] = []
     make = PointRunner.__init__
 
@@ -45,7 +45,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[PointRunner]:
 
 @pytest.fixture
 def closed(monkeypatch: pytest.MonkeyPatch) -> list[PointRunner]:
-    """Return the runners that are closed, as they go."""
+    """Return the list of closed runners, in the order of closing."""
     runners: list[PointRunner] = []
     close = PointRunner.close
 

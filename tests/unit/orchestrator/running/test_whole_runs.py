@@ -1,4 +1,4 @@
-"""Scenes run whole in this process: their rows are those of a campaign, with or without a file."""
+"""Scenes run whole in this process: their rows equal those of a campaign, with or without a file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.running import open_scene, run_scene
 
 
 class Counted(Progress):
-    """Keeps how many points were done at a time."""
+    """Keeps the number of points done at a time."""
 
     def __init__(self) -> None:
         super().__init__()
