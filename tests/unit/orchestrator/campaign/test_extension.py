@@ -1,4 +1,4 @@
-"""A campaign goes on with another sweep: it keeps every point whose values are equal, and is as if it were new."""
+"""A campaign goes on with another sweep: it keeps every point with equal values, and equals a new campaign."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ GROWN = {
 
 
 def assert_as_if_new(extended: Path, fresh: Path) -> None:
-    """Assert that two datasets are bit-identical with all attributes, but for their timing."""
+    """Assert that two datasets and all attributes are bit-identical, except for their timing."""
     assert_same_rows(extended, fresh)
     one, other = (read_flat(path).drop_vars(TIMING) for path in (extended, fresh))
     xr.testing.assert_identical(one, other)
@@ -112,7 +112,7 @@ def test_a_finished_campaign_is_extended_as_if_it_were_new(
 
 
 def begun(monkeypatch: pytest.MonkeyPatch, text: str, folder: Path, chunks: int) -> None:
-    """Leave a campaign after so many chunks of two or three points."""
+    """Interrupt a campaign after a number of chunks of two or three points."""
     with monkeypatch.context() as patch:
         patch.setattr(schedule, "FIRST_POINTS", 2)
         patch.setattr(schedule, "MOST_POINTS", 3)
@@ -191,7 +191,7 @@ def test_a_changed_title_keeps_every_point_and_is_that_of_the_dataset(
 def test_a_campaign_that_dies_at_any_step_of_an_extension_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every change of a file is one step: after any number of them the command finds a folder it can go on with."""
+    """Each change of a file is a step: after any number of steps the command can go on with the folder."""
     replace, unlink = os.replace, Path.unlink
     old, new = sweep(THREE, frequency(5)), sweep(frequency(9))
     campaign_here(monkeypatch, new, tmp_path / "new")

@@ -120,7 +120,7 @@ def test_builds_of_another_shape_are_damage(tmp_path: Path, builds: object) -> N
     path = tmp_path / "campaign.json"
     scene = scene_of(TEXT)
     identity = RunnerIdentity("fused", "x86_64", {"body": "0"})
-    write_manifest(path, scene, identity, 1, builds)  # type: ignore[arg-type]  # as a stranger would write it
+    write_manifest(path, scene, identity, 1, builds)  # type: ignore[arg-type]  # as another program might write it
     with pytest.raises(UsageError, match="got a damaged file"):
         read_manifest(path)
 
@@ -142,7 +142,7 @@ def test_a_folder_is_locked_once_and_free_again_afterwards(tmp_path: Path) -> No
 
 
 class Pool:
-    """Workers of which one sees another folder."""
+    """Workers, one of which sees another folder."""
 
     def __init__(self, elsewhere: Path) -> None:
         self.elsewhere = elsewhere

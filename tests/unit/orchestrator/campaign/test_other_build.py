@@ -1,4 +1,4 @@
-"""A campaign goes on with components of another build where its points, computed again, are equal bit for bit."""
+"""A campaign goes on with another build of its components if points computed again are equal bit for bit."""
 
 from __future__ import annotations
 
@@ -69,14 +69,14 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def begun(patch: pytest.MonkeyPatch, text: str, folder: Path, runner: str = BEGAN) -> list[Path]:
-    """Leave a campaign after two chunks of two or three points; return its parts."""
+    """Interrupt a campaign after two chunks of two or three points; return its parts."""
     with pytest.raises(CampaignInterrupted):
         campaign_here(patch, text, folder, runner=runner, most_chunks=2)
     return sorted((folder / "parts").glob("branch-*.nc"))
 
 
 def change(part: Path, name: str, value: float) -> None:
-    """Change the last value of a variable of a part, which is sound after it."""
+    """Change the last value of a variable of a part, which stays a sound file."""
     rows = read_flat(part)
     rows[name].values.reshape(-1)[-1] = value
     write_dataset(rows, part)
