@@ -1,4 +1,4 @@
-"""Of one mistake in a scene one clear line is said, whatever the scene is of."""
+"""One mistake in a scene of any kind gives one clear line."""
 
 from __future__ import annotations
 

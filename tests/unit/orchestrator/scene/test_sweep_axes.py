@@ -1,4 +1,4 @@
-"""Axes that move together, that are drawn, and that are refined: their values and their problems."""
+"""Axes that move together, drawn axes and refined axes: their values and their problems."""
 
 from __future__ import annotations
 
@@ -281,7 +281,7 @@ def test_a_log_axis_has_its_ends_one_sign_and_one_ratio(
     st.sampled_from(["independent", "up-down"]),
 )
 def test_the_points_of_zipped_axes_are_one_of_each_group(groups: list[list[int]], path: str) -> None:
-    """A group is a number of keys that move together; its first number is how many values they have."""
+    """The keys of a group move together, one for each number; its first number plus 1 is their number of values."""
     free = iter(
         ["body.mass", "body.stiffness", "body.damping", "body.displacement_start", "body.velocity_start"]
     )
