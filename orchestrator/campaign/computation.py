@@ -68,7 +68,7 @@ class Computation:
             self._schedule.lost(asked)
 
     def _tried_alone(self, chunk: Chunk) -> ChunkResult:
-        """Run a point whose workers died in its own process; write it as crashed if that process dies, too."""
+        """Run a point in its own process after its workers died; write it as crashed if that process dies, too."""
         if not self._pool.is_local:
             # This machine may differ from the machines of the workers.
             return write_crashed(

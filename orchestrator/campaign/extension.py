@@ -291,7 +291,7 @@ def read_kept(path: Path, scene: Scene) -> Kept:
             continue
         last = int(runs[stop - 1])
         branch = last // layout.shape[-1] if chained else 0
-        # The branch of the last run begins at `begin`, or before the stretch.
+        # The branch of the last run begins here, or with the stretch.
         begin = max(first, stop - 1 - last % layout.shape[-1]) if chained else first
         carried = _carried(rows, begin, stop) if chained else None
         stretches.append(StoredPart(path, Chunk(branch, int(runs[first]), last + 1), carried))

@@ -230,7 +230,7 @@ class GeneralRunner(Runner):
         variable = self._importer.components[component].variables[name]
         return "nan" in re.findall(r"\w+", (variable.description or "").lower())
 
-    # ---- what happens during a run ----
+    # ---- events of a run ----
 
     def _note_late(self, events: NDArray[np.float64]) -> None:
         self._seen += len(events)

@@ -215,7 +215,7 @@ class RestitutionPair(PairTable):
 
 
 class KelvinVoigtPair(PairTable):
-    """`[[contact]]` with `between`: a spring beside a dashpot; it never pulls."""
+    """`[[contact]]` with `between`: a spring and a dashpot in parallel, which never pull."""
 
     law: Annotated[Literal["kelvin_voigt"], _PAIR_LAWS]
     stiffness: Annotated[Positive, Rule(unit="N/m")]

@@ -74,8 +74,9 @@ def run_in_lanes(
     """Run points in lanes; return the records of the first points that ran, and the next start state of the branch.
 
     Along a branch each point starts where the point before ended. Results do not depend on the points in other lanes.
-    After the deadline, s of `time.perf_counter`, no point and no branch begins, except the first. `loop` runs points
-    that the lanes leave out, and `alone` runs points that the loop leaves out, too.
+    After the deadline, s of `time.perf_counter`, no branch begins except the first; begun branches run to their end,
+    and an independent point is a branch of its own. `loop` runs points that the lanes leave out, and `alone` runs
+    points that the loop leaves out, too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
     if prepared is not None:

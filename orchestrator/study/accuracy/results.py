@@ -62,7 +62,7 @@ TABLE = ResultTable(
     ("failure", "way", "1", "what is wrong with it", "text"),
     ("setting", "way", "1", "its value, in the unit of the key"),
 )
-"""Variables of a study; those of replays and of chaos, and unknown errors, are left out where they do not apply."""
+"""Variables of a study. Variables of replays and chaos, and errors of unknown quantities, may be left out."""
 
 
 def dataset_of(study: Comparison) -> xr.Dataset:
