@@ -181,9 +181,9 @@ class _Campaign:
 
     def _execution(self) -> str:
         """Return the execution of the points, `lanes` or `fused`, of an earlier sweep; empty: the scene's own."""
-        begun = "" if self._manifest is None else self._manifest.identity.execution
+        earlier_way = "" if self._manifest is None else self._manifest.identity.execution
         either = self._scene.execution.how == "auto" and may_go_by_lanes(self._scene)
-        return begun if either and begun in ("fused", "lanes") else ""
+        return earlier_way if either and earlier_way in ("fused", "lanes") else ""
 
     def _checked_manifest(self) -> Manifest | None:
         """Return the manifest of the folder, made again from its copies where it is lost; None for a new campaign."""

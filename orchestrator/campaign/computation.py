@@ -35,13 +35,13 @@ class Computation:
         """Compute all chunks that are left; raise VibroimpactError unless each can be computed and written."""
         while self._hand_out():
             ended = self._pool.next_finished()
-            asked = self._in_flight.pop(ended.ticket)
+            planned = self._in_flight.pop(ended.ticket)
             if ended.worker_lost:
-                self._lost(asked)
+                self._lost(planned)
             elif ended.error is not None:
                 raise ended.error
             else:
-                self._ended(asked, ended.result)
+                self._ended(planned, ended.result)
 
     def _hand_out(self) -> bool:
         """Hand out enough chunks to the workers; return whether any chunk is under way."""
@@ -55,17 +55,17 @@ class Computation:
     def _submit(self, chunk: Chunk) -> None:
         self._in_flight[self._pool.submit(run_chunk, self._work, chunk)] = chunk
 
-    def _ended(self, asked: Chunk, result: ChunkResult) -> None:
-        self._schedule.finished(asked, result)
+    def _ended(self, planned: Chunk, result: ChunkResult) -> None:
+        self._schedule.finished(planned, result)
         self._done(result)
 
-    def _lost(self, asked: Chunk) -> None:
-        if asked is self._alone:
-            self._ended(asked, self._tried_alone(asked))
-        elif asked.count == 1:
-            self._suspects.append(asked)
+    def _lost(self, planned: Chunk) -> None:
+        if planned is self._alone:
+            self._ended(planned, self._tried_alone(planned))
+        elif planned.count == 1:
+            self._suspects.append(planned)
         else:
-            self._schedule.lost(asked)
+            self._schedule.lost(planned)
 
     def _tried_alone(self, chunk: Chunk) -> ChunkResult:
         """Run a point in its own process after its workers died; write it as crashed if that process dies, too."""

@@ -210,10 +210,10 @@ def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
 
     `rows` are in run order and one-dimensional; rows may be missing.
     """
-    wanted = same_runs(old, new)
+    sources = same_runs(old, new)
     known = rows.run_index.values.astype(np.int64)
-    place = np.searchsorted(known, wanted).clip(max=known.size - 1)
-    there = (wanted >= 0) & (known[place] == wanted)
+    place = np.searchsorted(known, sources).clip(max=known.size - 1)
+    there = (sources >= 0) & (known[place] == sources)
     if any(axis.continuation for axis in new.sweep):
         branches = there.reshape(-1, _Layout(new.sweep).shape[-1])
         there = np.logical_and.accumulate(branches, axis=1).reshape(-1)
@@ -333,8 +333,8 @@ class EarlierSweep:
 
         The folder belongs to the old sweep until the new manifest is written, and nothing is removed before.
         """
-        rows, begun, hashed = self._rows(), self.manifest, scene_hash(new)
-        manifest = new_manifest(new, begun.identity, runs, begun.continued_with)
+        rows, old, hashed = self._rows(), self.manifest, scene_hash(new)
+        manifest = new_manifest(new, old.identity, runs, old.continued_with)
         if rows is not None:
             kept = kept_rows(self.scene, new, rows)
             count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]

@@ -269,13 +269,13 @@ def carried_manifest(content: Content, source: str) -> str:
     text, values = content["scene_text"], content["scene"]
     content = {**content, "sha256": content_hash(content)}
     shown = {key: json.dumps(value) for key, value in values.items()}
-    told: dict[str, str] = {}
+    in_text: dict[str, str] = {}
     if len(text) > MOST_CARRIED_TEXT or any(len(one) > MOST_CARRIED_VALUE for one in shown.values()):
-        told = {key: json.dumps(value) for key, value in values_of(text, source).items()}
-    if len(text) > MOST_CARRIED_TEXT and told == shown:
+        in_text = {key: json.dumps(value) for key, value in values_of(text, source).items()}
+    if len(text) > MOST_CARRIED_TEXT and in_text == shown:
         return json.dumps(content | {"scene": None, "scene_text": None})
     short = {
-        key: None if len(shown[key]) > MOST_CARRIED_VALUE and told.get(key) == shown[key] else value
+        key: None if len(shown[key]) > MOST_CARRIED_VALUE and in_text.get(key) == shown[key] else value
         for key, value in values.items()
     }
     return json.dumps(content | {"scene": short})

@@ -47,7 +47,7 @@ class _Copy:
         return str(self.content["scene_hash"])
 
     @property
-    def begun(self) -> str:
+    def shared(self) -> str:
         """The keys that all parts of one campaign share, as text."""
         return json.dumps({key: value for key, value in self.content.items() if key not in _CHANGING})
 
@@ -62,8 +62,8 @@ class _Copy:
 
     def is_of_campaign(self, other: _Copy, *, any_sweep: bool) -> bool:
         """Return whether two files belong to one campaign; one of them may list fewer of its builds."""
-        begun = self.runner == other.runner if any_sweep else self.begun == other.begun
-        return begun and all(was == now for was, now in zip(self.builds, other.builds, strict=False))
+        is_same = self.runner == other.runner if any_sweep else self.shared == other.shared
+        return is_same and all(was == now for was, now in zip(self.builds, other.builds, strict=False))
 
 
 @dataclass(slots=True)
@@ -86,7 +86,7 @@ def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
     chosen = _chosen(there, finished, scene_hash(scene))
     if chosen is None:
         return None
-    count = sum(copy.begun == chosen.begun for copy in there.parts)
+    count = sum(copy.shared == chosen.shared for copy in there.parts)
     origin = "1 part" if count == 1 else f"{count} parts" if count else chosen.path.name
     return _completed(chosen, scene), origin
 
@@ -126,12 +126,12 @@ def _finished(path: Path, scene: Scene) -> _Copy | None:
     try:
         part = read_part(path)
         runs = len(part.run_index)
-        return _Copy(path, _told_by(part.attrs, runs, scene), runs)
+        return _Copy(path, _content_of_dataset(part.attrs, runs, scene), runs)
     except (VibroimpactError, *DAMAGE):
         return None
 
 
-def _told_by(attrs: Mapping[str, Any], runs: int, scene: Scene) -> Content:
+def _content_of_dataset(attrs: Mapping[str, Any], runs: int, scene: Scene) -> Content:
     text = str(attrs["scene"])
     content: Content = {
         "format": FORMAT,
@@ -164,7 +164,7 @@ def _chosen(there: _Folder, finished: _Copy | None, given: str) -> _Copy | None:
         return None
     first = candidates[0]
     _refuse_several(first, there, extended=bool(begins))
-    same = [copy for copy in (*there.parts, *there.kept) if copy.begun == first.begun]
+    same = [copy for copy in (*there.parts, *there.kept) if copy.shared == first.shared]
     return max([first, *same], key=lambda copy: len(copy.builds))
 
 
@@ -194,8 +194,8 @@ def _completed(copy: _Copy, scene: Scene) -> Content:
         return content | {"sha256": content_hash(content)}  # comments and title may differ
     if content["scene"] is not None:
         values = content["scene"].items()
-        told = values_of(content["scene_text"], scene.source) if None in content["scene"].values() else {}
-        content["scene"] = {key: told.get(key) if value is None else value for key, value in values}
+        known = values_of(content["scene_text"], scene.source) if None in content["scene"].values() else {}
+        content["scene"] = {key: known.get(key) if value is None else value for key, value in values}
     if content["sha256"] != content_hash(content):
         raise UsageError(
             f"{copy.path}: expected the scene that this campaign was started with, to make campaign.json again, got "

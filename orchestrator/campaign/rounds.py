@@ -122,8 +122,8 @@ class Rounds:
     def _is_of(self, rows: xr.Dataset, branches: Sequence[Branch]) -> bool:
         runs = rows.run_index.values
         points = points_of(branches, Chunk(0, int(runs[0]), int(runs[-1]) + 1))
-        wanted = np.stack([points.values[key] for key in self._names], axis=1)
-        return bool(np.array_equal(wanted, self._values(rows)))
+        expected = np.stack([points.values[key] for key in self._names], axis=1)
+        return bool(np.array_equal(expected, self._values(rows)))
 
     def _values(self, rows: xr.Dataset) -> NDArray[np.float64]:
         return np.stack([rows[name].values for name in self._names.values()], axis=1)

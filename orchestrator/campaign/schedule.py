@@ -66,7 +66,7 @@ class Gap:
 
 
 @dataclass(slots=True)
-class _Strand:
+class _BranchRest:
     """The rest of one branch that is computed piece by piece, in order."""
 
     branch: int
@@ -89,8 +89,8 @@ class ChunkSchedule:
         self._unit = len(branches[0].points) if self._chained else 1
         self._pace: float | None = None
         self._units: deque[Gap] = deque()
-        self._strands: deque[_Strand] = deque()
-        self._begun: dict[int, _Strand] = {}
+        self._waiting: deque[_BranchRest] = deque()
+        self._open_branches: dict[int, _BranchRest] = {}
         runs = self._first_runs[-1] + len(branches[-1].points)
         for gap in gaps_between(parts, runs):
             self._queue(gap)
@@ -108,50 +108,50 @@ class ChunkSchedule:
 
     def next_chunk(self) -> Chunk | None:
         """Return the next chunk to compute; None while all remaining chunks wait for the end of another chunk."""
-        if self._units and len(self._begun) < self.most_in_flight:
+        if self._units and len(self._open_branches) < self.most_in_flight:
             return self._cut_units()
-        if self._strands:
-            return self._cut_strand(self._strands.popleft())
+        if self._waiting:
+            return self._cut_branch(self._waiting.popleft())
         return None
 
-    def finished(self, asked: Chunk, result: ChunkResult) -> None:
+    def finished(self, planned: Chunk, result: ChunkResult) -> None:
         """Record a finished chunk, with the runs that it left out and the time that it took."""
         done = result.chunk
         if result.compute_seconds > 0.0:
             latest = result.compute_seconds / done.count
             self._pace = latest if self._pace is None else 0.5 * (self._pace + latest)
-        strand = self._begun.get(asked.branch)
-        if done.stop < asked.stop:
-            self._take_back(strand, Gap(done.stop, asked.stop, result.carried))
-        if strand is None:
+        rest = self._open_branches.get(planned.branch)
+        if done.stop < planned.stop:
+            self._take_back(rest, Gap(done.stop, planned.stop, result.carried))
+        if rest is None:
             return
         if result.compute_seconds > 0.0:
-            strand.pace = result.compute_seconds / done.count
-        if strand.gaps and strand.gaps[0].first == done.stop:
-            strand.gaps[0].start = result.carried
-        self._go_on(strand)
+            rest.pace = result.compute_seconds / done.count
+        if rest.gaps and rest.gaps[0].first == done.stop:
+            rest.gaps[0].start = result.carried
+        self._go_on(rest)
 
     def lost(self, chunk: Chunk) -> None:
         """Take back a chunk that killed its worker, to be handed out again in small pieces."""
-        strand = self._begun.get(chunk.branch)
-        if strand is None and self._chained and chunk.count <= self._unit:
-            strand = self._begun[chunk.branch] = _Strand(chunk.branch, deque())
-        self._take_back(strand, Gap(chunk.first, chunk.stop, chunk.start, max(1, chunk.count // LOST_PIECES)))
-        if strand is not None:
-            self._go_on(strand)
+        rest = self._open_branches.get(chunk.branch)
+        if rest is None and self._chained and chunk.count <= self._unit:
+            rest = self._open_branches[chunk.branch] = _BranchRest(chunk.branch, deque())
+        self._take_back(rest, Gap(chunk.first, chunk.stop, chunk.start, max(1, chunk.count // LOST_PIECES)))
+        if rest is not None:
+            self._go_on(rest)
 
-    def _take_back(self, strand: _Strand | None, gap: Gap) -> None:
+    def _take_back(self, rest: _BranchRest | None, gap: Gap) -> None:
         self.left += gap.stop - gap.first
-        if strand is not None:
-            strand.gaps.appendleft(gap)
+        if rest is not None:
+            rest.gaps.appendleft(gap)
         else:
             self._queue(gap)
 
-    def _go_on(self, strand: _Strand) -> None:
-        if strand.gaps:
-            self._strands.append(strand)
+    def _go_on(self, rest: _BranchRest) -> None:
+        if rest.gaps:
+            self._waiting.append(rest)
         else:
-            del self._begun[strand.branch]
+            del self._open_branches[rest.branch]
 
     def _queue(self, gap: Gap) -> None:
         """Sort the runs of a gap into whole units and pieces of branches."""
@@ -159,11 +159,11 @@ class ChunkSchedule:
             branch = self._branch_of(piece.first)
             if (piece.stop - piece.first) % self._unit == 0:
                 self._units.append(piece)
-            elif branch in self._begun:
-                self._begun[branch].gaps.append(piece)
+            elif branch in self._open_branches:
+                self._open_branches[branch].gaps.append(piece)
             else:
-                strand = self._begun[branch] = _Strand(branch, deque([piece]))
-                self._strands.append(strand)
+                rest = self._open_branches[branch] = _BranchRest(branch, deque([piece]))
+                self._waiting.append(rest)
 
     def _at_branch_ends(self, gap: Gap) -> Iterator[Gap]:
         """Split a gap into the rest of a branch, whole branches, and the beginning of a branch."""
@@ -190,8 +190,8 @@ class ChunkSchedule:
             self._units.popleft()
         branch = self._branch_of(taken.first)
         if points < self._unit:
-            strand = self._begun[branch] = _Strand(branch, deque([taken]), self._pace)
-            return self._cut_strand(strand)
+            rest = self._open_branches[branch] = _BranchRest(branch, deque([taken]), self._pace)
+            return self._cut_branch(rest)
         return self._hand_out(branch, taken, seconds)
 
     def _points_beside(self, gap: Gap) -> int:
@@ -207,9 +207,9 @@ class ChunkSchedule:
         share = self.left * (self._pace or 0.0) / (2 * self._workers)
         return min(CHUNK_SECONDS, max(share, SHORTEST_SECONDS))
 
-    def _cut_strand(self, strand: _Strand) -> Chunk:
-        gap = strand.gaps[0]
-        pace = strand.pace or self._pace
+    def _cut_branch(self, rest: _BranchRest) -> Chunk:
+        gap = rest.gaps[0]
+        pace = rest.pace or self._pace
         seconds = SHORTEST_SECONDS if pace is None else CHUNK_SECONDS
         count = _points_in(seconds, pace)
         if gap.stop - gap.first < 1.5 * count:
@@ -217,8 +217,8 @@ class ChunkSchedule:
             count = gap.stop - gap.first
         taken = gap.take(min(count, gap.most))
         if gap.first == gap.stop:
-            strand.gaps.popleft()
-        return self._hand_out(strand.branch, taken, seconds)
+            rest.gaps.popleft()
+        return self._hand_out(rest.branch, taken, seconds)
 
     def _hand_out(self, branch: int, taken: Gap, seconds: float) -> Chunk:
         self.left -= taken.stop - taken.first

@@ -53,7 +53,7 @@ def on_free_side(body: BodyPoints, stops: Sequence[Stop], state: State) -> State
     return (*q.tolist(), *p.tolist())
 
 
-def _smallest(shapes: Floats, motions: Floats, wanted: Floats) -> Floats:
+def _smallest(shapes: Floats, motions: Floats, distances: Floats) -> Floats:
     """Return the motion with the smallest kinetic energy that moves the contacts by the given distances."""
-    forces = np.linalg.lstsq(shapes @ motions.T, wanted, rcond=None)[0]
+    forces = np.linalg.lstsq(shapes @ motions.T, distances, rcond=None)[0]
     return np.asarray(motions.T @ forces, dtype=np.float64)

@@ -182,15 +182,15 @@ def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
     short = {key: coordinate_name(key, every) for key in keys}
     twice = Counter(short.values())
     taken = _taken(scene) | set(coordinate_names(scene).values()) | set(stored_samples(scene))
-    wanted = [name if twice[name] == 1 else key for key, name in short.items()]
-    return dict(zip(short, file_names(wanted, taken), strict=True))
+    preferred = [name if twice[name] == 1 else key for key, name in short.items()]
+    return dict(zip(short, file_names(preferred, taken), strict=True))
 
 
 def coordinate_names(scene: Scene) -> dict[str, str]:
     """Return the name in the file of each swept key, by key."""
     keys = [axis.key for axis in scene.sweep]
-    wanted = [scene.sweep_coordinate_name(key) for key in keys]
-    return dict(zip(keys, file_names(wanted, _taken(scene)), strict=True))
+    preferred = [scene.sweep_coordinate_name(key) for key in keys]
+    return dict(zip(keys, file_names(preferred, _taken(scene)), strict=True))
 
 
 def _taken(scene: Scene) -> frozenset[str]:

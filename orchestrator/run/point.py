@@ -318,7 +318,7 @@ class _Run:
     def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
         """Return the record of the run."""
         self.driver.take_rows()
-        wanted = self.scene.record.impacts
+        has_impacts = self.scene.record.impacts
         displacement, velocity = self.driver.observed()
         if not math.isfinite(displacement):
             where = f"displacement: expected a finite number, got {displacement}"
@@ -327,8 +327,8 @@ class _Run:
             outcome=outcome,
             message=message,
             periods=self._period_rows(),
-            impacts=self.driver.impacts() if wanted else None,
-            sticks=self.driver.sticks() if wanted else None,
+            impacts=self.driver.impacts() if has_impacts else None,
+            sticks=self.driver.sticks() if has_impacts else None,
             samples=self._sample_rows(),
             final_displacement=displacement,
             final_velocity=velocity,

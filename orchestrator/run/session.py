@@ -68,8 +68,8 @@ class Session:
                 f"outputs: expected variables of the body, got {channels}. A MeasuredSession has them."
             )
         self.outputs = self._plan.names
-        wanted = "fused" if execution == "auto" and not others else execution
-        self.execution = "coupled" if others else wanted
+        chosen = "fused" if execution == "auto" and not others else execution
+        self.execution = "coupled" if others else chosen
         self._driver = driver_of(scene, self.execution, others, connections)
         self._driver.watch(
             contacts=len(scene.stops),

@@ -122,6 +122,6 @@ def chain_effects(scene: Scene) -> dict[str, list[str]]:
 def in_one_line(scene: Scene, execution: str = "auto") -> str:
     """Return engine, laws and effects as one line."""
     stops = [f"{key} {what}" for key, what in (laws(scene) | contacts(scene)).items()]
-    told = ("stops" if scene.stops else "", "contacts")
-    called = [name for name, there in effects(scene).items() if there and name not in told]
+    listed = ("stops" if scene.stops else "", "contacts")
+    called = [name for name, there in effects(scene).items() if there and name not in listed]
     return "; ".join(part for part in (engine(scene, execution), ", ".join(stops), ", ".join(called)) if part)

@@ -32,8 +32,8 @@ class TimeSeriesPlan:
 
     def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
         series = scene.record.time_series
-        asked = series.variables if series is not None else ()
-        self.all_names: tuple[str, ...] = asked if names is None else tuple(names)
+        series_names = series.variables if series is not None else ()
+        self.all_names: tuple[str, ...] = series_names if names is None else tuple(names)
         self.names = tuple(name for name in self.all_names if name not in CHANNELS)
         parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))

@@ -227,8 +227,8 @@ def text_with_values(text: str, values: Mapping[str, float], recordings: Sequenc
     mass = 2.5 # kg
     stiffness = 4.0
     """
-    wanted = parse_toml(text)
-    _put_all(wanted, values, recordings)
+    target = parse_toml(text)
+    _put_all(target, values, recordings)
     # the import takes time, and few scenes are written anew
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
@@ -237,11 +237,11 @@ def text_with_values(text: str, values: Mapping[str, float], recordings: Sequenc
         document = tomlkit.parse(text)
         _put_all(document, values, recordings)
         edited = tomlkit.dumps(document)
-        if parse_toml(edited) == wanted:
+        if parse_toml(edited) == target:
             return edited
     except (TOMLKitError, ValueError):
         pass  # tomlkit cannot read the text, or has written it wrong: it is written anew
-    return tomlkit.dumps(wanted)
+    return tomlkit.dumps(target)
 
 
 def _put_all(

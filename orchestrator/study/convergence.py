@@ -19,9 +19,9 @@ from vibroimpact.orchestrator.study.statistics import statistics_of
 
 LADDER = (1, 2, 4, 8, 16, 32, MOST_MODES)
 """Numbers of modes that are tried first; the fewest are then searched between two of these numbers."""
-JUDGED = 4
+CHAOS_MODES = 4
 """Number of modes of the run that decides whether the motion is chaotic; a scene with fewer modes takes all."""
-LONG = 1.0
+NOTED_SECONDS = 1.0
 """Wall time of a run, s, above which `note` gets a line about the run."""
 REPLICATES = 4
 """Further runs of chaotic motion, which give the sampling error of its statistics."""
@@ -68,14 +68,14 @@ class ModeRuns:
         most = getattr(scene.body, "size", MOST_MODES)
         fewest = next(n for n in range(1, most + 1) if n == most or self._is_valid(n))
         self.ladder = [fewest, *(n for n in LADDER if fewest < n < most), *([most] if most > fewest else [])]
-        self._judged = min(max(fewest, JUDGED), most)
-        if self.of(self._judged).failure:  # the ten disturbed runs would fail in the same way
-            raise self.failed(self.tried[self._judged].failure)
-        self._scales = scales_of(self._with(self._judged))
+        self._chaos_modes = min(max(fewest, CHAOS_MODES), most)
+        if self.of(self._chaos_modes).failure:  # the ten disturbed runs would fail in the same way
+            raise self.failed(self.tried[self._chaos_modes].failure)
+        self._scales = scales_of(self._with(self._chaos_modes))
 
     @cached_property
     def _is_chaotic(self) -> bool:
-        return reference_of(self._with(self._judged)).chaotic
+        return reference_of(self._with(self._chaos_modes)).chaotic
 
     def _with(self, modes: int) -> Scene:
         return self.scene.with_values({MODES: modes})
@@ -91,7 +91,7 @@ class ModeRuns:
         """Return the observation of the scene with a number of modes."""
         if modes not in self.tried:
             self.tried[modes] = observed(self._with(modes))
-            if self.tried[modes].seconds > LONG:
+            if self.tried[modes].seconds > NOTED_SECONDS:
                 self._note(f"{modes} modes{self.where}: {self.tried[modes].seconds:.1f} s")
         return self.tried[modes]
 

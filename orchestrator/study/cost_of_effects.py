@@ -85,7 +85,7 @@ class CostOfEffects(Study[Share]):
             *("<effect", "<asked for by", ">of the time", ">spread", "<without it"),
         )
         for share in self.shares:
-            rows.add_row(share.effect.name, share.effect.asked_by, *_told(share), share.changes)
+            rows.add_row(share.effect.name, share.effect.asked_by, *_time_cells(share), share.changes)
         wide_terminal().print(rows)
         _print_motions(self.shares, self.scene.units)
         if self.found:
@@ -96,8 +96,8 @@ class CostOfEffects(Study[Share]):
 
 def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:
     """Print means over the motions whose impacts cannot be compared one by one."""
-    told = [(share, share.motions) for share in shares if share.motions is not None]
-    if told:
+    compared = [(share, share.motions) for share in shares if share.motions is not None]
+    if compared:
         names = [
             f"{name.replace('_', ' ')} ({written_unit(unit_in(system, unit))})"
             for name, unit in QUANTITIES.items()
@@ -106,9 +106,9 @@ def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:
             "Where impacts are lost or a motion is chaotic: means over the recording",
             *("<without", ">impacts", *(f">{name}" for name in names), "<motion"),
         )
-        scene = told[0][1][0]
+        scene = compared[0][1][0]
         rows.add_row("-", *_as_a_whole(scene))
-        for share, (full, without) in told:
+        for share, (full, without) in compared:
             rows.add_row(share.effect.asked_by, *_as_a_whole(without, full))
         wide_terminal().print(rows)
     for share in shares:
@@ -129,7 +129,7 @@ def _as_a_whole(motion: Motion, full: Motion | None = None) -> tuple[str, ...]:
     return str(motion.impacts), *cells, motion.orbit or "-"
 
 
-def _told(share: Share) -> tuple[str, str]:
+def _time_cells(share: Share) -> tuple[str, str]:
     if np.isnan(share.seconds).all():
         return "-", "-"
     parts = 100.0 * share.seconds / share.full

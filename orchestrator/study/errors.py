@@ -17,9 +17,9 @@ QUANTITIES = (
 """Quantities that have an error."""
 FIRST_IMPACTS = 10
 """Number of impacts over which the growth of errors is shown where the motion is chaotic."""
-STILL = 1e-6
+CONSTANT_SPREAD = 1e-6
 """Spread of a sampled variable over its size, up to which it is constant but for rounding; above, it moves."""
-COMPARED = 1e-3
+LEAST_SPEED = 1e-3
 """Speed of an impact over the fastest speed, below which it is not compared: ways end a chatter differently."""
 
 
@@ -97,7 +97,7 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
     samples, expected = found.samples, _at_the_instants_of(found, reference)
     if samples is not None and expected is not None and expected.size and samples.shape == expected.shape:
         spread, size = np.ptp(expected, axis=0), np.abs(expected).max(axis=0)
-        scale = np.where(spread > STILL * size, spread, size)  # a constant variable is relative to its size
+        scale = np.where(spread > CONSTANT_SPREAD * size, spread, size)  # size of a constant variable
         off = np.abs(samples - expected).max(axis=0)
         moving = scale > 0.0
         errors["samples"] = float((off[moving] / scale[moving]).max()) if moving.any() else math.nan
@@ -164,7 +164,7 @@ def _compared(impacts: Floats) -> np.ndarray:
     speeds = np.abs(impacts[:, 1])
     if np.isnan(speeds).all():
         return np.arange(len(impacts))
-    return np.flatnonzero(speeds >= COMPARED * np.nanmax(speeds))
+    return np.flatnonzero(speeds >= LEAST_SPEED * np.nanmax(speeds))
 
 
 def _reach(impacts: Floats, scales: Scales) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.orchestrator.study.errors import COMPARED
+from vibroimpact.orchestrator.study.errors import LEAST_SPEED
 from vibroimpact.orchestrator.study.observation import Observation
 
 REPEATS = 1e-6
@@ -38,7 +38,7 @@ def orbit_of(found: Observation, period: float | None, window: tuple[float, floa
     is_endless = found.held is OrbitClass.sticking
     if is_endless:
         speeds = found.impacts[:, 1]
-        found = replace(found, impacts=found.impacts[speeds > COMPARED * speeds.max(initial=0.0)])
+        found = replace(found, impacts=found.impacts[speeds > LEAST_SPEED * speeds.max(initial=0.0)])
     if not len(found.impacts):
         return "P(inf,1)" if is_endless else "no impacts"
     most = round((window[1] - window[0]) / period) // LEAST_TURNS

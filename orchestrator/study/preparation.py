@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.references import observed, reference_of
 from vibroimpact.orchestrator.study.swept_modes import SweepPlaces, modes_of_sweep
 
-TOLD = 3
+MOST_NAMED = 3
 """Most points that a note names where no number of modes meets the tolerance; the dataset has all of them."""
 
 
@@ -57,8 +57,8 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
         found = {**scene.found, "tolerance": tolerance, "estimated_error": math.nan, "estimated_error_of": of}
         return scene.model_copy(update={"found": found})
     errors = [_error_of_solution(point, run) for point, run in zip(points, ran, strict=True)]
-    told = [error for error in errors if not math.isnan(error)]
-    solution = max(told, default=math.nan)
+    known = [error for error in errors if not math.isnan(error)]
+    solution = max(known, default=math.nan)
     error = solution if truncation is None else float(truncation)
     if truncation is not None and not math.isnan(solution):
         error += solution
@@ -66,7 +66,9 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
         **scene.found,
         "tolerance": tolerance,
         "estimated_error": error,
-        "estimated_error_of": _what(len(points), int(scene.found.get("modes_checked_points", 0)), len(told)),
+        "estimated_error_of": _estimated_parts(
+            len(points), int(scene.found.get("modes_checked_points", 0)), len(known)
+        ),
     }
     if math.isnan(error):
         note("the motion is chaotic: no error of single impacts is estimated")
@@ -104,7 +106,7 @@ def with_found_modes(scene: Scene, note: Note = lambda text: None) -> Scene:
     }
     if looked_at.unmet:
         found["modes_unmet_points"] = "; ".join(looked_at.unmet)
-        few, more = looked_at.unmet[:TOLD], len(looked_at.unmet) - TOLD
+        few, more = looked_at.unmet[:MOST_NAMED], len(looked_at.unmet) - MOST_NAMED
         note(
             f"no number of modes meets execution.tolerance = {tolerance:g} at {'; '.join(few)}"
             f"{f'; and {more} more' if more > 0 else ''}"
@@ -121,20 +123,20 @@ def round_off(error: float) -> float | str:
     return float(f"{error:.3g}") if math.isfinite(error) else "another motion"
 
 
-def _what(points: int, of_modes: int, told: int) -> str:
+def _estimated_parts(points: int, of_modes: int, regular: int) -> str:
     """Return the parts of the estimated error, in words.
 
-    `points` is the number of points of the sweep with a solution, `told` the number whose motion is not chaotic.
+    `points` is the number of points of the sweep with a solution, `regular` the number whose motion is not chaotic.
     `of_modes` is the number of points at which numbers of modes were compared; 0 where there was no comparison.
     """
     parts = [
         *([f"the number of modes{_largest(of_modes)}"] if of_modes else []),
-        *([f"the solution of the motion{_largest(points)}"] if told else []),
+        *([f"the solution of the motion{_largest(points)}"] if regular else []),
     ]
-    chaotic = points - told
+    chaotic = points - regular
     left_out = (
         ""
-        if not chaotic or not told
+        if not chaotic or not regular
         else f"; of {chaotic}, which are chaotic, that of the solution means nothing"
     )
     return (" and ".join(parts) or f"nothing: the motion is chaotic{_largest(points)}") + left_out
@@ -154,7 +156,7 @@ def _error_of_solution(scene: Scene, run: Observation) -> float:
     if reference.chaotic:
         return math.nan
     errors = errors_of(run, reference.observation, reference.scales)
-    told = [name for name, error in errors.of.items() if not math.isnan(error)]
-    if errors.failure or not told:
+    known = [name for name, error in errors.of.items() if not math.isnan(error)]
+    if errors.failure or not known:
         return math.inf
-    return max(errors.of[name] + reference.error.get(name, 0.0) for name in told)
+    return max(errors.of[name] + reference.error.get(name, 0.0) for name in known)

@@ -38,8 +38,8 @@ def statistics_of(
 
     Replicates are further runs of the reference, from slightly different numbers.
     """
-    apart, told = (_off, _impacts) if len(reference.impacts) else (_off_samples, _samples)
-    if min(told(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
+    apart, count_of = (_off, _impacts) if len(reference.impacts) else (_off_samples, _samples)
+    if min(count_of(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
         return None
     interval, distance = apart(found, reference)
     by_chance = [apart(one, reference) for one in replicates]

@@ -186,8 +186,8 @@ class _Search:
 
     def errors(self) -> dict[Place, float]:
         """Return the error at each place where a number of modes meets the tolerance."""
-        told = {place: self.look_at(place) for place in list(self.runs)}
-        return {place: error for place, error in told.items() if not math.isnan(error)}
+        distances = {place: self.look_at(place) for place in list(self.runs)}
+        return {place: error for place, error in distances.items() if not math.isnan(error)}
 
     def refine(self) -> None:
         """Try places between known neighbours, where errors are large and neighbours are far apart."""

@@ -74,8 +74,8 @@ def run_in_lanes(
     """Run points in lanes; return the records of the first points that ran, and the next start state of the branch.
 
     Along a branch each point starts where the point before ended. Results do not depend on the points in other lanes.
-    After the deadline, s of `time.perf_counter`, no branch begins except the first; begun branches run to their end,
-    and an independent point is a branch of its own. `loop` runs points that the lanes leave out, and `alone` runs
+    After the deadline, s of `time.perf_counter`, no branch begins except the first; begun branches run to their end.
+    An independent point is a branch of its own. `loop` runs points that the lanes leave out, and `alone` runs
     points that the loop leaves out, too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
@@ -115,10 +115,10 @@ class _LaneRun:
     def __init__(self, loop: PointLoop, values: LaneValues, points: PreparedPoints, alone: Alone) -> None:
         self._loop, self._values, self._points, self._alone = loop, values, points, alone
         self._is_structure = loop.scene.body.IS_STRUCTURE
-        count, told = len(values), lane_points(loop.scene, points)
-        self._plan, self._modal = told.plan, told.modal
+        count, lanes = len(values), lane_points(loop.scene, points)
+        self._plan, self._modal = lanes.plan, lanes.modal
         self._first = values.first if loop.chained else np.ones(count, dtype=np.bool_)
-        self._given = told.given
+        self._given = lanes.given
         for place, state in values.starts.items():
             q, p = np.array(self._free_start(place, state)).reshape(2, -1)
             self._given["start_q"][:, place], self._given["start_p"][:, place] = q, p

@@ -59,7 +59,7 @@ class MeasuringChain:
         ring, ratio = 2.0 * math.pi * cell.natural_frequency, cell.damping_ratio
         # an overdamped cell has two rates: the slower one counts
         rate = ring * (ratio if ratio <= 1.0 else 1.0 / (ratio + math.sqrt(ratio * ratio - 1.0)))
-        return after + (_FORGOTTEN / rate if rate > 0.0 else math.inf)
+        return after + (_DECAYED / rate if rate > 0.0 else math.inf)
 
     def begin(self, time: float, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return the volts at a start time (s), with the load cell settled; values and volts have the shape (1,)."""
@@ -94,7 +94,7 @@ def _opened(cell: CellTable) -> LoadCell:
     return LoadCell(*numbers, cell.contact_duration or 0.0)
 
 
-_FORGOTTEN = 37.0
+_DECAYED = 37.0
 """Number of time constants after which a ring is below the rounding of doubles: exp(-37) = 1e-16."""
 
 

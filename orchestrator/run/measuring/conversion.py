@@ -84,28 +84,28 @@ def channel_attributes(scene: Scene) -> dict[str, dict[str, Any]]:
     """Return the attributes of each channel, with the numbers of its chain, or their coordinates if swept."""
     swept = [axis.key for axis in scene.sweep]
 
-    def told(key: str) -> float | str:
+    def number_of(key: str) -> float | str:
         return coordinate_name(key, swept) if key in swept else scene.value(key)
 
     found: dict[str, dict[str, Any]] = {}
     for place, name in enumerate(scene.channels):
         own: dict[str, Any] = {"channel": name}
         if name.startswith("sensor.") and scene.sensor is not None and scene.sensor.range:
-            own["sensor_range"] = told("sensor.range")
+            own["sensor_range"] = number_of("sensor.range")
         if name == LOAD_CELL:
-            own["sensitivity"] = told("load_cell.sensitivity")
+            own["sensitivity"] = number_of("load_cell.sensitivity")
         if scene.noise is not None:
             own |= {
-                "noise_rms": told(f"noise.{name.partition('.')[0]}"),
+                "noise_rms": number_of(f"noise.{name.partition('.')[0]}"),
                 "noise_seed": scene.noise.seed,
             }
         if scene.daq is not None:
             own |= {
-                "range": told("daq.range"),
+                "range": number_of("daq.range"),
                 "bits": scene.daq.bits,
-                "clock_error_ppm": told("daq.clock_error"),
+                "clock_error_ppm": number_of("daq.clock_error"),
             }
-            own["skew"] = told("daq.skew") if "daq.skew" in swept else place * scene.daq.skew
+            own["skew"] = number_of("daq.skew") if "daq.skew" in swept else place * scene.daq.skew
             own["place"] = place
         found[name] = own
     return found

@@ -84,8 +84,8 @@ class MeasuredSession:
         self._exciter = exciter
         self._place = 0.0
         stops = [f"contact[{k}].force" for k in range(1, len(scene.stops) + 1)]
-        told = ("displacement", "velocity", exciter.displacement, *stops)
-        self._variables = tuple(dict.fromkeys((*told, *self._chain.variables)))
+        observed = ("displacement", "velocity", exciter.displacement, *stops)
+        self._variables = tuple(dict.fromkeys((*observed, *self._chain.variables)))
         driver = driver_of(self._scene, "fused")
         assert isinstance(driver, BodyDriver)
         self._driver = driver
@@ -122,7 +122,7 @@ class MeasuredSession:
         cell = self._scene.load_cell
         self._on_cell = LoadCell(1.0, contact_duration=cell.contact_duration or 0.0) if cell else None
         now = {name: np.array([value]) for name, value in zip(self._variables, row, strict=True)}
-        self._tell(np.zeros(1), now, NO_IMPACTS)
+        self._update_truth(np.zeros(1), now, NO_IMPACTS)
         self.impacts_of_block = NO_IMPACTS
 
     def advance(self, times: Floats, volts: Floats) -> dict[str, Floats]:
@@ -174,7 +174,7 @@ class MeasuredSession:
         impacts = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
         self._driver.rows.blocks = []
         values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
-        self._tell(ends, values, impacts)
+        self._update_truth(ends, values, impacts)
         return self._chain.volts(ends, values, impacts), impacts
 
     def instants_in(self, times: Floats) -> Counts:
@@ -195,7 +195,7 @@ class MeasuredSession:
         )
         return float(force[0])
 
-    def _tell(self, ends: Floats, values: Mapping[str, Floats], impacts: Floats) -> None:
+    def _update_truth(self, ends: Floats, values: Mapping[str, Floats], impacts: Floats) -> None:
         contacts = [float(column[-1]) for name, column in values.items() if name.startswith("contact[")]
         self.truth = {
             "displacement": float(values["displacement"][-1]),

@@ -142,8 +142,8 @@ def _amplitude_problems(body: Body, forcing: Forcing) -> Iterator[Problem]:
 def _place_problems(draft: Draft, body: Body, forcing: Forcing) -> Iterator[Problem]:
     """Yield the problems of `location` and `mode`, each of which belongs to one kind of load of a beam."""
     for key, kind in (("location", "force"), ("mode", "mode")):
-        wanted = body.FORCING_KEYS.get(key) == forcing.kind
-        if key in draft.written("forcing") and not wanted:
+        belongs = body.FORCING_KEYS.get(key) == forcing.kind
+        if key in draft.written("forcing") and not belongs:
             got = f"it beside {body.NAME} under {forcing.kind}"
             yield Problem(f"forcing.{key}", f'{key} for a beam with kind = "{kind}"', got, f"Remove {key}.")
     if not body.FORCING_KEYS:

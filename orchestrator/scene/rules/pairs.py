@@ -209,8 +209,8 @@ def _free_port(draft: GeneralDraft, component: DraftComponent, rest: str, plan: 
     parameters = component.parameters or {}
     ports = [name.removesuffix(".law") for name in component.facts.variables if name.endswith("].law")]
     for port in ports:
-        wanted = _start_values(component.facts, port, rest)
-        if all(parameters.get(name) == value for name, value in wanted.items()):
+        needed = _start_values(component.facts, port, rest)
+        if all(parameters.get(name) == value for name, value in needed.items()):
             return port
     swept = draft.written("sweep")
     named = [point for table in draft.contacts if isinstance(table, PairTable) for point in table.between]

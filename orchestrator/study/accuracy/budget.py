@@ -10,9 +10,9 @@ from vibroimpact.orchestrator.study.ways.way import Trial
 
 LEAST_BUDGET = 10.0
 """Least budget, processor time in s; below, the reference and one run of each way leave no time for timing."""
-OUTSIDE = 2.0
+OVERHEAD_SECONDS = 2.0
 """Processor time of a command outside its study, s: it loads the package, prints a table and draws a figure."""
-BUSY = 0.2
+BUSY_SHARE = 0.2
 """Share of the time of runs spent waiting for a processor, above which the machine counts as busy."""
 
 
@@ -20,7 +20,7 @@ BUSY = 0.2
 class Effort:
     """The time that a study took on the machine."""
 
-    asked: float = math.nan
+    budget: float = math.nan
     """Budget of the study: processor time, s."""
     processor: float = math.nan
     """Processor time of all processes of the study, s."""
@@ -32,7 +32,7 @@ class Effort:
     @property
     def is_busy(self) -> bool:
         """Whether other programs kept the runs from the processor."""
-        return self.waited > BUSY
+        return self.waited > BUSY_SHARE
 
     def in_words(self) -> str:
         """Return the effort in one or two sentences.
@@ -44,8 +44,8 @@ class Effort:
         >>> Effort(10.0, 9.2, 9.6, 0.01).in_words()
         'Processor time: 9.2 s of the 10 s asked for, in 9.6 s of wall time.'
         """
-        asked = f"{self.processor:.2g} s of the {self.asked:g} s asked for"
-        said = f"Processor time: {asked}, in {self.wall:.2g} s of wall time."
+        spent = f"{self.processor:.2g} s of the {self.budget:g} s asked for"
+        said = f"Processor time: {spent}, in {self.wall:.2g} s of wall time."
         if not self.is_busy:
             return said
         return (
@@ -70,7 +70,7 @@ class Budget:
     @property
     def left(self) -> float:
         """Processor time left for the study, s; negative where the study has overspent."""
-        return self.seconds - OUTSIDE - self.spent
+        return self.seconds - OVERHEAD_SECONDS - self.spent
 
     def time(self, trial: Trial) -> float:
         """Run a trial once; return its processor time, s."""

@@ -11,7 +11,7 @@ from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measure
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.references import Reference
 
-VAGUE = 1e-2
+MOST_REFERENCE_ERROR = 1e-2
 """Relative error of a reference, above which no way is recommended without a tolerance."""
 SAME_SCORE = 1.0
 """Difference of scores in percent, up to which two ways explain a recording equally well."""
@@ -38,7 +38,7 @@ def cheapest(
     """
     own = error_of_reference(reference, quantity)
     able = _comparable(measured, quantity)
-    if tolerance is None and own > VAGUE:
+    if tolerance is None and own > MOST_REFERENCE_ERROR:
         return None
     if tolerance is None:
         least = min((one.error(quantity) for one in able), default=math.nan)
@@ -89,13 +89,13 @@ def advice(study: Comparison) -> str:
         return _why_none(study)
     known = error_of_reference(study.reference, quantity)
     what = "" if quantity == "all" else f" of {quantity.replace('_', ' ')}"
-    told, cost = chosen.told(quantity, known), _seconds(chosen.cost)
-    words = f"Take {chosen.way.label}: a relative error{what} of {told} in {cost} a run"
+    error, cost = chosen.error_in_words(quantity, known), _seconds(chosen.cost)
+    words = f"Take {chosen.way.label}: a relative error{what} of {error} in {cost} a run"
     others = [one for one in _comparable(study.measured, quantity) if one.way.name != chosen.way.name]
     if others:
         other = min(others, key=lambda one: one.cost)
         ratio = other.cost / chosen.cost
-        words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.told(quantity, known)}"
+        words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.error_in_words(quantity, known)}"
     words += _for_the_score(study)
     if study.reference.chaotic:
         begin, end = study.reference.scales.window
@@ -136,7 +136,7 @@ def _why_none(study: Comparison) -> str:
         if any(one.errors.failure for one in study.measured):
             return "No way has an error that can be told: give a longer --budget where they did not finish."
         return "Nothing that is recorded moves: there is nothing to compare."
-    if known > VAGUE:
+    if known > MOST_REFERENCE_ERROR:
         return (
             f"No way stands out, since the reference is known to {known:.0e} only: motion that "
             "jumps at its samples is not compared in scenes of components."

@@ -16,7 +16,7 @@ from vibroimpact.orchestrator.study.references import Reference
 from vibroimpact.orchestrator.study.statistics import Statistics
 from vibroimpact.orchestrator.study.ways.way import Way
 
-SHORT = 0.125
+SHORT_SHARE = 0.125
 """Share of a part that runs once more: the difference separates the fixed cost of a run from the cost per time."""
 
 
@@ -91,7 +91,7 @@ class Measured:
     @property
     def _rate(self) -> float:
         """Processor time per whole studied time, s, without the fixed cost of a run."""
-        shorter = SHORT * self.part
+        shorter = SHORT_SHARE * self.part
         rate = (self.each - self.short) / (self.part - shorter) if self.short < self.each else math.nan
         return rate if rate == rate else self.each / self.part
 
@@ -109,7 +109,7 @@ class Measured:
         """Relative error of a quantity, or the largest of all; NaN where the way failed."""
         return math.nan if self.errors.failure else self.errors.worst(quantity)
 
-    def told(self, quantity: str, known: float) -> str:
+    def error_in_words(self, quantity: str, known: float) -> str:
         """Return the error in words, or the reference's error `known` as a bound where the error is smaller."""
         error = self.error(quantity)
         if error != error:

@@ -35,11 +35,11 @@ def shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
     console = wide_terminal()
     with Live(console=console, transient=True) as live:
 
-        def told(one: Measured) -> None:
+        def take(one: Measured) -> None:
             found.append(one)
             live.update(table_of(title, found, quantity, 0.0, console.width))
 
-        yield told
+        yield take
 
 
 def _say_tried(one: Measured) -> None:
@@ -85,7 +85,7 @@ def table_of(
             f"{one.way.name}{' (another model)' if one.way.model else ''}",
             one.way.knob or "-",
             f"{one.way.setting:.3g}" if one.way.knob else "-",
-            one.told(quantity, known),
+            one.error_in_words(quantity, known),
             *((about + _known_duration(one.cost),) if of_runs else ()),
             *((about + _known_duration(one.cost_of_one(periods)),) if of_periods else ()),
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
@@ -135,8 +135,9 @@ def write_tuned(text: str, compared: Comparison, target: Path) -> None:
             f"--write: expected a way that a scene can ask for, got {chosen.way.label}. "
             "It is the cheapest all the same."
         )
+    error = chosen.error_in_words(compared.quantity, known)
     reason = (
-        f"{chosen.way.label}: {compared.quantity.replace('_', ' ')} to {chosen.told(compared.quantity, known)} "
+        f"{chosen.way.label}: {compared.quantity.replace('_', ' ')} to {error} "
         f"(asked: {compared.tolerance:g}), {duration(chosen.cost)} a run; vibroimpact accuracy"
     )
     write_atomically(target, tuned_text(text, settings, reason).encode("utf-8"))

@@ -58,7 +58,7 @@ from vibroimpact.orchestrator.study.references import (
 )
 from vibroimpact.orchestrator.study.statistics import statistics_of
 from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
-from vibroimpact.orchestrator.study.ways.models import told_by
+from vibroimpact.orchestrator.study.ways.models import modes_reference
 from vibroimpact.orchestrator.study.ways.way import Trial, Way
 
 BUDGET = 40.0
@@ -184,7 +184,7 @@ class AccuracyOfScene(Study[Measured]):
             cheapest(self.found, self.tolerance, self.quantity, self._reference),
             self._orbit,
             remarks,
-            told_by(self._ways),
+            modes_reference(self._ways),
             self._spends.effort(),
         )
 

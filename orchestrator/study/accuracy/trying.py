@@ -9,7 +9,7 @@ from dataclasses import replace
 import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy.measured import SHORT, Measured
+from vibroimpact.orchestrator.study.accuracy.measured import SHORT_SHARE, Measured
 from vibroimpact.orchestrator.study.accuracy.reach import Passed
 from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.errors import Errors, errors_of, no_errors
@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.study.references import Reference, best_of, scales
 from vibroimpact.orchestrator.study.ways.trials import far_off
 from vibroimpact.orchestrator.study.ways.way import Trial, Way, opened_part
 
-COUNTED = 0.125
+COUNTING_SHARE = 0.125
 """Share of the limit of a run, from which on its calls are not counted: counting takes several times as long."""
 PART_OF_REACHED = 0.5
 """Largest next part of the time, over the part that the run reached before it was given up."""
@@ -155,14 +155,14 @@ def _measure_more(one: Measured, processor: float, most: float) -> None:
     """Count the calls of a cheap way; run a way that simulated only a part over an eighth of that part."""
     way = one.way
     if one.is_extrapolated:
-        trial = way.open(None, SHORT * one.part)
+        trial = way.open(None, SHORT_SHARE * one.part)
         try:
             # over so short a time an output may have no value yet, such as the last impact before the first one
             with suppress(ComponentError):
                 one.short = clock.CLOCK.timed(trial)[0]
         finally:
             trial.close()
-    elif processor < COUNTED * most:
+    elif processor < COUNTING_SHARE * most:
         one.calls = clock.CLOCK.calls(way)
 
 

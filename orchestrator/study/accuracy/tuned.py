@@ -32,8 +32,8 @@ def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
     how = "fused"
     """
     lines = [f"# {line}" for line in reason.splitlines()] + tomli_w.dumps(dict(settings)).splitlines()
-    wanted = parse_toml(text)
-    wanted[TABLE] = {**wanted.get(TABLE, {}), **settings}
+    expected = parse_toml(text)
+    expected[TABLE] = {**expected.get(TABLE, {}), **settings}
     header = _HEADER.search(text)
     if header is None:
         found = f"{text.rstrip()}\n\n[{TABLE}]\n" + "\n".join(lines) + "\n"
@@ -44,8 +44,8 @@ def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
         kept = own.sub("", text[header.end() : end].lstrip("\n"))
         found = text[: header.end()] + "\n" + "\n".join(lines) + "\n" + kept + text[end:]
     try:
-        if parse_toml(found) == wanted:
+        if parse_toml(found) == expected:
             return found
     except ValueError:
         pass  # the table has a key of several lines or another form: all of the text is written anew
-    return "\n".join(f"# {line}" for line in reason.splitlines()) + "\n" + tomli_w.dumps(wanted)
+    return "\n".join(f"# {line}" for line in reason.splitlines()) + "\n" + tomli_w.dumps(expected)

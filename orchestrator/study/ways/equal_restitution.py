@@ -16,7 +16,7 @@ MOST_RATIO = 100.0
 """Upper bound of the search for the damping ratio of a mass on a Kelvin-Voigt stop."""
 NEARLY_ELASTIC = 1e-4
 """1 - e, below which a Hunt-Crossley stop has e = 1 - 2 p / 3: rounding leaves no digits of the whole law."""
-LEAST = 1e-12
+LOWEST_SEARCHED = 1e-12
 """Lower bound of the search for the coefficient of restitution e of a Hunt-Crossley stop."""
 CLOSEST = 1e-14
 """Relative distance of p e from 1 at the upper bound: a strongly damped Hunt-Crossley stop has e = 1 / p."""
@@ -136,7 +136,7 @@ def restitution_of_product(product: float) -> float:
     if product < 1.5 * NEARLY_ELASTIC:
         return 1.0 - 2.0 * product / 3.0
     most = min(1.0, (1.0 - CLOSEST) / product)
-    return _root(lambda e: _off(product, e), LEAST, most)
+    return _root(lambda e: _off(product, e), LOWEST_SEARCHED, most)
 
 
 def product_of_restitution(restitution: float) -> float:

@@ -91,7 +91,7 @@ def _fewer_modes(scene: Scene) -> list[Way]:
     ]
 
 
-def told_by(ways: Sequence[Way]) -> str:
+def modes_reference(ways: Sequence[Way]) -> str:
     """Return the reference of other numbers of modes, in words; empty where there are no such ways."""
     finest = next((way.against.body for way in ways if way.against is not None), None)
     if finest is None:

@@ -35,7 +35,7 @@ from vibroimpact.orchestrator.study.ways.span import window_of
 ROWS_A_PERIOD = 4
 """Rows of an integration in a period, over the square of the number of modes: the integrator's steps between two rows
 are limited. The impacts have rows of their own."""
-LOST = 1e3
+OUT_OF_BOUNDS = 1e3
 """Displacement over the reference's largest displacement, above which a motion has left all bounds."""
 
 
@@ -152,8 +152,8 @@ class ModelExchangeTrial:
             return not is_late
 
         ports = range(1, len(scene.stops) + 1)
-        told = ("count", "last_time", "last_velocity")
-        output = [f"contact[{k}].{what}" for k in ports for what in told]
+        reported = ("count", "last_time", "last_velocity")
+        output = [f"contact[{k}].{what}" for k in ports for what in reported]
         interval = (scene.period or end) / (ROWS_A_PERIOD * getattr(scene.body, "size", 1) ** 2)
         try:
             rows = integrated(
@@ -193,4 +193,4 @@ def far_off(found: Observation, expected: Observation) -> bool:
     """Return whether a motion has left all bounds, for example by falling through its stop."""
     size = max(abs(expected.lowest), abs(expected.highest))
     reach = max(abs(found.lowest), abs(found.highest), abs(found.final[0]))
-    return math.isfinite(size) and size > 0.0 and reach > LOST * size
+    return math.isfinite(size) and size > 0.0 and reach > OUT_OF_BOUNDS * size

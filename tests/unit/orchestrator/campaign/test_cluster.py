@@ -60,8 +60,8 @@ def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pool_module, "STALL_SECONDS", 1.0)
-    said = Said()
-    with open_workers(workers=1, progress=said) as pool:
+    noted = Notes()
+    with open_workers(workers=1, progress=noted) as pool:
         pool.submit(same, 1)
         assert pool.next_finished().result == 1
         # the state of Dask's sender when the clock goes back 20 minutes just after a message
@@ -69,18 +69,18 @@ def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
         ticket = pool.submit(same, 2)
         finished = pool.next_finished()
         assert (finished.ticket, finished.result) == (ticket, 2)
-    assert len(said.notes) == 1
-    assert "clock that was set back" in said.notes[0]
+    assert len(noted.notes) == 1
+    assert "clock that was set back" in noted.notes[0]
 
 
 def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.1)
     monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.1)
-    said = Said()
-    with open_workers(workers=1, progress=said) as pool:
+    noted = Notes()
+    with open_workers(workers=1, progress=noted) as pool:
         pool.submit(time.sleep, 2.0)
         assert pool.next_finished().error is None
-    assert not said.notes
+    assert not noted.notes
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sleep of the C library")
@@ -90,10 +90,10 @@ def test_a_worker_that_loads_for_long_and_is_done_when_it_answers_is_no_stall(
     # with 15 processes on 2 cores, a campaign ended with the error of a clock that was set back
     monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.5)
     monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.2)
-    said = Said()
-    with open_workers(workers=1, progress=said) as pool:
+    noted = Notes()
+    with open_workers(workers=1, progress=noted) as pool:
         assert list(pool.call_everywhere(keep_the_interpreter, 3).values()) == [3]
-    assert not said.notes
+    assert not noted.notes
 
 
 def test_an_answer_to_another_call_of_dask_is_not_taken_for_workers_that_are_lost(
@@ -132,12 +132,12 @@ def test_a_worker_that_does_not_answer_any_more_is_replaced(
 ) -> None:
     for name, seconds in (("STALL_SECONDS", 0.5), ("LOOK_SECONDS", 0.2), ("RESULT_SECONDS", 1.0)):
         monkeypatch.setattr(pool_module, name, seconds)
-    said = Said()
+    noted = Notes()
     (tmp_path / "wish").touch()
-    with open_workers(workers=1, progress=said) as pool:
+    with open_workers(workers=1, progress=noted) as pool:
         pool.submit(freeze_once, str(tmp_path / "wish"))
         assert pool.next_finished().result == "thawed"
-    assert len(said.notes) == 1
+    assert len(noted.notes) == 1
 
 
 def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
@@ -153,7 +153,7 @@ def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
     assert not [one for one in recwarn if "never awaited" in str(one.message)]
 
 
-class Said(Progress):
+class Notes(Progress):
     """Keeps its notes."""
 
     def __init__(self) -> None:

@@ -69,9 +69,9 @@ def test_a_steep_slope_is_no_jump_once_its_points_are_near_enough(place: float, 
 def test_no_more_points_come_than_there_is_room_for(places: list[float], room: int) -> None:
     points = known(np.linspace(0.0, 1.0, 7)[:, None], steps_at(places))
     more = halved_intervals(points, 0, 1e-6, 1.0, room)
-    wanted = halved_intervals(points, 0, 1e-6, 1.0, 10**6)
-    assert len(more.values) == min(room, len(wanted.values))
-    assert more.left == len(wanted.values) - len(more.values)
+    unlimited = halved_intervals(points, 0, 1e-6, 1.0, 10**6)
+    assert len(more.values) == min(room, len(unlimited.values))
+    assert more.left == len(unlimited.values) - len(more.values)
 
 
 @given(st.permutations(range(12)), places_of_steps)

@@ -288,10 +288,10 @@ def test_spikes_of_a_simulated_cell_are_forces_by_the_sensitivity_of_its_scene(t
     run_scene(scene(SENSOR, CELL, DAQ, swept, variables=("load_cell",)), tmp_path / "run.nc")
     for run, sensitivity in enumerate((0.004, 0.008)):
         cell = open_signals(tmp_path / "run.nc", run).channels["load_cell"]
-        found, asked = spike_report(cell), spike_report(cell, mechanics=Mechanics(sensitivity=sensitivity))
+        found, given = spike_report(cell), spike_report(cell, mechanics=Mechanics(sensitivity=sensitivity))
         assert found.dataset.spike_peak.attrs["units"] == "N"
         assert found.dataset.sizes["spike"] > 0
-        assert found.dataset.identical(asked.dataset)
+        assert found.dataset.identical(given.dataset)
 
 
 def test_swept_ranges_flag_each_run_by_its_own(tmp_path: Path) -> None:

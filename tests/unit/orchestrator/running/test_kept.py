@@ -101,12 +101,12 @@ def test_a_scene_in_use_is_not_given_to_another_thread(opened: list[PointRunner]
 
 def test_threads_that_run_one_scene_get_its_results() -> None:
     scene = scene_of(frequency_text(20))
-    wanted = vi.run(scene, progress=False).final_displacement.values.tolist()
+    expected = vi.run(scene, progress=False).final_displacement.values.tolist()
     with ThreadPoolExecutor(4) as threads:
         found = threads.map(
             lambda _: vi.run(scene, progress=False).final_displacement.values.tolist(), range(8)
         )
-    assert all(one == wanted for one in found)
+    assert all(one == expected for one in found)
 
 
 def test_a_run_that_fails_or_is_interrupted_leaves_nothing_open(

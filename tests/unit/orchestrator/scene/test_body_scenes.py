@@ -82,12 +82,12 @@ def test_each_law_tells_the_fmu_its_number_and_its_own_parameters(
 ) -> None:
     scene = scene_of(changed(CHAIN, "restitution = 0.7", law))
     assert integer_parameters(scene)["contact[1].law"] == number
-    told = {
+    given = {
         name.removeprefix("contact[1]."): value
         for name, value in float_parameters(scene, None).items()
         if name.startswith("contact[1].")
     }
-    assert told == {"position": 0.1, **floats}
+    assert given == {"position": 0.1, **floats}
 
 
 def test_two_stops_of_one_side_share_a_place_if_the_nearer_one_yields() -> None:

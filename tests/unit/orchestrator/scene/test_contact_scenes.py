@@ -189,9 +189,11 @@ def test_a_stop_that_cannot_be_asked_or_says_no_side_is_refused(folder: Path) ->
         'parameters = { law = "kelvin_voigt", stiffness = 1e4, position = 0.1 }\n', ""
     )
     text = text.replace('stop = "stop"', 'stop = "stop"\nstop_displacement = "u"\nstop_force = "y"')
-    told = problems_of(folder, text)
-    assert told[0].startswith("contact[1].stop: expected an FMU whose state can be kept and restored, got")
-    assert told[1].startswith('contact[1].side: expected "upper" or "lower", got nothing.')
+    problems = problems_of(folder, text)
+    assert problems[0].startswith(
+        "contact[1].stop: expected an FMU whose state can be kept and restored, got"
+    )
+    assert problems[1].startswith('contact[1].side: expected "upper" or "lower", got nothing.')
 
 
 # ---- running ----

@@ -391,7 +391,7 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     tables.append('[component.c7]\nfmu = "ball.fmu"\nfmi = "3.0"')
     tables.append('[[connection]]\nfrom = "c0.x"\nto = "c1.y"')
     problems = problems_of("\n".join([*tables, "[record]\nrecorded_time = 1"]), tmp_path / "s.toml")
-    told = [
+    starts = [
         f"component.c0.fmu: expected an FMU file, got no file {tmp_path}/bal.fmu. Did you mean ball.fmu?",
         f"component.c1.fmu: expected an FMU file, got no file {tmp_path}/no/x.fmu. "
         f"There is no folder {tmp_path}/no.",
@@ -405,8 +405,8 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         'got fmi = "3.0" beside a file. ',
         "execution.macro_step: ",
     ]
-    assert len(problems) == len(told)
-    for problem, start in zip(problems, told, strict=True):
+    assert len(problems) == len(starts)
+    for problem, start in zip(problems, starts, strict=True):
         assert problem.startswith(start)
         assert "\n" not in problem
 

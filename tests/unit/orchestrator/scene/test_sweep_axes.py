@@ -264,9 +264,9 @@ def test_a_log_axis_has_its_ends_one_sign_and_one_ratio(
     start: float, stop: float, points: int, sign: float
 ) -> None:
     ends = f"start = {sign * start}, stop = {sign * stop}, points = {points}"
-    axes, told = read(f'"body.velocity_start" = {{ {ends}, spacing = "log" }}')
-    if told:
-        assert "values that differ from each other" in told[0]
+    axes, refused = read(f'"body.velocity_start" = {{ {ends}, spacing = "log" }}')
+    if refused:
+        assert "values that differ from each other" in refused[0]
         assert start == pytest.approx(stop, rel=1e-12)
         return
     (axis,) = axes
@@ -318,9 +318,9 @@ def test_any_distribution_gives_sound_values_or_problems(
         f'"body.stiffness" = {{ distribution = "{kind}", low = {low}, high = {high}{moments} }}',
         UNIFORM % (1, 2),
     ]
-    axes, told = read(*lines)
-    if told:
-        assert all(": expected " in problem and ", got " in problem for problem in told)
+    axes, refused = read(*lines)
+    if refused:
+        assert all(": expected " in problem and ", got " in problem for problem in refused)
         return
     first, second = axes
     assert len(first.values) == len(second.values) == 2**power * (4 if design == "saltelli" else 1)

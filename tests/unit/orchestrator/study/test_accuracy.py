@@ -499,9 +499,9 @@ def test_chaos_of_a_general_scene_is_compared_from_its_start_and_then_by_what_it
     assert study.reference.chaotic
     assert study.scene.record.recorded_time < 100.0
     assert all(one.error("all") < 1e-10 for one in study.measured)
-    told = [one.statistics for one in study.measured if one.statistics is not None]
-    assert len(told) > 10
-    assert all(one.distribution_distance < 3.0 * one.distribution_sampling for one in told)
+    compared = [one.statistics for one in study.measured if one.statistics is not None]
+    assert len(compared) > 10
+    assert all(one.distribution_distance < 3.0 * one.distribution_sampling for one in compared)
     assert "only statistics compare" in advice(study)
 
 
