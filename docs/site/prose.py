@@ -7,11 +7,9 @@ begins with a relative that hides its noun. The last line gives the mean length 
 from __future__ import annotations
 
 import ast
-import io
 import re
 import subprocess
 import sys
-import tokenize
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +26,11 @@ HIDDEN_NOUN = re.compile(
 ABBREVIATIONS = re.compile(
     r"\b(e\.g|i\.e|cf|vs|eqs?|[Ff]igs?|[Ss]ec|[Nn]o|pp?|[Vv]ol|al|approx|resp|Dr|Prof)\.$"
 )
+PYTHON = re.compile(
+    r"""(\"{3}|'{3})(?:\\.|(?!\1).)*\1|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|#[^\n]*""", re.DOTALL
+)
+"""Strings and comments of Python, so that a mark within a string begins no comment."""
+C = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 #: A pragma is no prose.
 PRAGMA = re.compile(r"(noqa|type:|ruff:|mypy:|pragma:|fmt:|clang-format|!)")
 
@@ -152,19 +155,34 @@ def paragraphs_of_comment(path: Path, line: int, text: str) -> Iterator[Paragrap
     yield from taken()
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements within a node, at any depth."""
+    for block in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for statement in getattr(node, block, ()):
+            yield statement
+            yield from statements(statement)
+
+
 def paragraphs_of_python(path: Path, text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs of docstrings, of texts below a field, and of comments."""
-    for node in ast.walk(ast.parse(text)):
+    for node in statements(ast.parse(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             yield from paragraphs_of_comment(path, value.lineno, value.value)
-    lines: list[tuple[int, int, bool, str]] = []
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.COMMENT:
-            said = token.string.lstrip("#:")
-            if not PRAGMA.match(said.strip()):
-                lines.append((*token.start, not token.line[: token.start[1]].strip(), said))
-    yield from _joined(path, lines)
+    found = ((each.start(), each.group()) for each in PYTHON.finditer(text))
+    yield from _joined(path, _alone(text, ((at, said, "#:") for at, said in found if said[0] == "#")))
+
+
+def _alone(text: str, comments: Iterable[tuple[int, str, str]]) -> Iterator[tuple[int, int, bool, str]]:
+    """Yield line, column, whether it stands alone, and text of comments, given by place, text and mark."""
+    line = last = 0
+    for at, said, mark in comments:
+        line += text.count("\n", last, at)
+        last = at
+        begins = text.rfind("\n", 0, at) + 1
+        words = said.lstrip(mark)
+        if not PRAGMA.match(words.strip()):
+            yield line + 1, at - begins, not text[begins:at].strip(), words
 
 
 def _joined(path: Path, lines: Iterable[tuple[int, int, bool, str]]) -> Iterator[Paragraph]:
@@ -185,20 +203,14 @@ def _joined(path: Path, lines: Iterable[tuple[int, int, bool, str]]) -> Iterator
 
 def paragraphs_of_c(path: Path, text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs of the comments of a C file."""
-    pattern = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.DOTALL)
-    lines: list[tuple[int, int, bool, str]] = []
-    for found in pattern.finditer(text):
-        said = found.group()
-        before = text[: found.start()]
-        number, column = before.count("\n") + 1, found.start() - before.rfind("\n") - 1
-        if said.startswith("//"):
-            if not PRAGMA.match(said.lstrip("/ ")):
-                lines.append((number, column, not before[before.rfind("\n") + 1 :].strip(), said.lstrip("/")))
-        elif said.startswith("/*"):
+    found = [(each.start(), each.group()) for each in C.finditer(text)]
+    for at, said in found:
+        if said.startswith("/*"):
             inner = re.sub(r"(?m)^[ \t]*\*(?!\*)( ?)", "", said[2:-2].lstrip("*!"))
             if not PRAGMA.match(inner.strip()):
-                yield from paragraphs_of_comment(path, number, inner)
-    yield from _joined(path, lines)
+                yield from paragraphs_of_comment(path, text.count("\n", 0, at) + 1, inner)
+    lines = ((at, said, "/") for at, said in found if said.startswith("//"))
+    yield from _joined(path, _alone(text, lines))
 
 
 def paragraphs_of(path: Path) -> Iterator[Paragraph]:
