@@ -25,11 +25,11 @@ MINUTES = 60.0
 LINE_SECONDS = 60.0
 """Time between two lines of progress where there is no terminal to draw bars on."""
 PROBLEMS_SHOWN = 20
-"""Of each kind; the journal holds all."""
+"""Problems of each kind that are shown; the journal holds all."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one case or all; return the exit code: 0 no problem, 1 some, 2 misused."""
+    """Run one case or all; return the exit code: 0 without problems, 1 with problems, 2 for misuse."""
     if len(arguments) == 2 and arguments[1].isdecimal():
         seconds, problem = attempt(arguments[0], "soak", int(arguments[1]))
         print(f"{arguments[0]} {arguments[1]}: {problem or 'no problem'} ({seconds:.2f} s)")

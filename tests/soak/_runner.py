@@ -12,7 +12,7 @@ from soak._journal import Journal, Tried
 from soak._kinds import Kind
 
 LONGEST_BLOCK, BLOCKS = 50, 100
-"""Cases of one kind in a row, at most, and blocks of a kind, at least: a process is left to one kind for a block."""
+"""Most cases of one kind in a row, and fewest blocks of a kind: a process keeps one kind for a block."""
 LOOK_SECONDS = 0.2
 """Time between looks at children that do not answer."""
 
@@ -34,15 +34,15 @@ def run(
     Parameters
     ----------
     kinds : sequence of Kind
-        All of one package; they advance side by side, by equal shares, after those whose cases run alone.
+        Kinds of one package; they advance side by side, by equal shares, after the kinds whose cases run alone.
     counts : dict
         Number of cases of each kind, by name.
     base : int
         Base seed.
     journal : Journal
-        What has been tried, and where it is added.
+        Finished cases; new ones are added.
     seconds : float
-        Wall time after which no case is begun; those that are being tried are given up.
+        Wall time after which no case starts; unfinished cases are given up.
     processes : int, optional
         Number of child processes; one for each core.
     tell : function of Tried, optional
@@ -115,7 +115,7 @@ def _hand_next(child: Child, waiting: Iterator[tuple[Kind, int, int]]) -> bool:
 
 
 def _answers(busy: Sequence[Child]) -> list[tuple[Child, tuple[float, str | None]]]:
-    """Wait a moment for answers; return those that came, and those of children whose time is up."""
+    """Wait a moment for answers; return the answers, and the reports of children whose time is up."""
     with selectors.DefaultSelector() as selector:
         for child in busy:
             selector.register(child.answers, selectors.EVENT_READ, child)

@@ -53,7 +53,7 @@ def check(seed):
 
 @pytest.fixture
 def kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Make a package of two kinds, one of them bad in all ways."""
+    """Make a package of two kinds, one of them bad in every way."""
     name = f"kinds_{tmp_path.name}"
     package = tmp_path / "packages" / name
     package.mkdir(parents=True)
@@ -108,7 +108,7 @@ def test_a_run_goes_on_where_it_ended_and_tries_nothing_twice(kinds: str, tmp_pa
     first = Journal(path)
     assert run([kind("good", kinds)], {"good": 3}, 0, first, 60.0, processes=1)
     first.close()
-    # as a machine leaves it that went off in the middle of a line
+    # the file of a machine that lost power in the middle of a line
     path.write_text(path.read_text() + '{"kind": "good", "ca')
     second = Journal(path)
     assert run([kind("good", kinds)], {"good": 5}, 0, second, 60.0, processes=1, tell=told.append)

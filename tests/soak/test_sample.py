@@ -11,7 +11,7 @@ from soak._kinds import kind, names
 from soak._runner import run
 
 BASE_SEED = 11
-# of seconds of processor time a case, tests/unit has shorter tests of each; grammars have `test_grammars`
+# a case of these takes seconds of processor time; tests/unit has shorter tests of each, `test_grammars` of grammars
 DEAR = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests", "service_strangers"}
 
 DEAR |= {name for name in names() if name.startswith("grammar_")}
