@@ -13,7 +13,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 def with_measurement(text: str, record: Mapping[str, Any]) -> str:
-    """Return a page with what is between the two markers made from the record anew.
+    """Return a page whose text between the two markers is made anew from the record.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def _references(record: Mapping[str, Any]) -> str:
 
 
 def _growth(record: Mapping[str, Any]) -> str:
-    """Return how the error of chaotic motion grows from impact to impact, of each way at its finest setting."""
+    """Return a table of the error in chaotic motion from impact to impact, for each way at its finest setting."""
     finest = {row["way"]: row for row in record["rows"] if row["growth"] and not row["failure"]}
     most = max((len(row["growth"]) for row in finest.values()), default=0)
     lines = [
@@ -128,7 +128,7 @@ def _table(record: Mapping[str, Any]) -> str:
 
 
 def _error(error: float, known: float) -> str:
-    """Return an error; below what the reference is known to, that."""
+    """Return an error as text, or "<" and the error of the reference where that is larger."""
     return f"{error:.0e}" if error > known else f"< {known:.0e}"
 
 
