@@ -1,6 +1,6 @@
-"""`make audit`: known holes in the versions that are installed, and in the lowest ones that pyproject.toml allows.
+"""`make audit`: known vulnerabilities in the installed versions, and in the lowest versions of pyproject.toml.
 
-pip-audit asks the database of advisories. Where that cannot be reached, one line says so, and nothing is refused.
+pip-audit asks the database of advisories. If the database cannot be reached, one line says so, and the audit passes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[2]
 UNREACHABLE = ("ConnectionError", "Could not connect", "Max retries exceeded", "ServiceError", "HTTPError")
-"""What pip-audit says where it gets no answer."""
+"""Message of pip-audit without an answer from the database."""
 REMARK = "make audit: the database of advisories could not be reached. Nothing is known of {}."
 
 
@@ -35,7 +35,7 @@ def lowest() -> Iterator[str]:
 
 
 def audited(what: str, *options: str) -> int:
-    """Ask about some packages; return 1 where one has a known hole, or where pip-audit itself fails."""
+    """Ask about some packages; return 1 if one has a known vulnerability, or if pip-audit itself fails."""
     command = [sys.executable, "-m", "pip_audit", "--progress-spinner", "off", "--format", "json", *options]
     done = subprocess.run(command, capture_output=True, text=True)
     try:
@@ -53,7 +53,7 @@ def audited(what: str, *options: str) -> int:
     if answered:
         print(f"{what}: {len(answered)} of {len(asked)} packages are known, {len(holes)} with a hole.")
     else:
-        # a mirror of packages alone knows of none, and pip-audit calls that "no known vulnerabilities"
+        # a package mirror has no advisories, and pip-audit reports its silence as "no known vulnerabilities"
         print(REMARK.format(what), file=sys.stderr)
     return int(bool(holes))
 

@@ -1,4 +1,4 @@
-"""Whether a run in memory is what the file of the same run gives, to types, order and bits."""
+"""Whether a run in memory equals the file of the same run, in types, order and bits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.scene import Scene
 
 
 def assert_memory_is_file(scene: Scene) -> xr.Dataset:
-    """Run a scene; compare what is made in memory with what its file gives; return the former."""
+    """Run a scene; compare the dataset in memory with the dataset of its file; return the former."""
     with opened_scene(scene) as opened:
         flat = run_whole(opened)
     found = opened_in_memory(flat)
