@@ -1,4 +1,4 @@
-"""The command line as a person uses it: what it prints, where, and the exit code."""
+"""The command line for a user: its output, the streams, and the exit code."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ finally:
 
 
 def test_a_run_without_a_tolerance_loads_no_studies(tmp_path: Path) -> None:
-    # they bring scipy.stats and more, longer than the run takes
+    # studies load scipy.stats and more, which takes longer than the run
     program = f"""
 import sys
 from vibroimpact.orchestrator.commands.cli import main
@@ -235,7 +235,7 @@ def test_the_demo_runs_the_example() -> None:
 
 @app.command("fail-for-a-test", hidden=True)
 def fail_for_a_test() -> None:
-    """Fail as nobody foresaw."""
+    """Raise an unforeseen error."""
     raise TypeError("an unforeseen thing")
 
 
@@ -257,7 +257,7 @@ def test_a_defect_shows_its_place_with_debug(capsys: pytest.CaptureFixture[str])
 
 
 def fmu_from_oscillator(path: Path, change: Callable[[str, bytes], tuple[str, bytes]]) -> Path:
-    """Write the Oscillator's FMU with its members changed."""
+    """Write the Oscillator's FMU with changed members."""
     with zipfile.ZipFile(fmu_path("Oscillator")) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
             target.writestr(*change(name, source.read(name)))
@@ -301,7 +301,7 @@ def test_a_bad_fmu_file_is_misuse_with_one_message(
         'variables = ["body.displacement"]\nrate = 10\n'
     )
     output = "x.nc" if command == "run" else "folder"
-    # the workers of a campaign are children of a process of its own, as a person starts it
+    # the workers of a campaign need a process of their own as parent, as in a terminal
     start = in_this_process if command == "run" else vibroimpact
     assert_misuse(start(command, scene, "-o", tmp_path / output), told)
     assert not (tmp_path / "x.nc").exists()

@@ -1,4 +1,4 @@
-"""Descriptions with the faults of other tools, in `run` and `fmu check` alike: refused, doubted or remarked on."""
+"""Descriptions with the faults of other tools, in `run` and `fmu check` alike: refused, warned about or remarked on."""
 
 from __future__ import annotations
 

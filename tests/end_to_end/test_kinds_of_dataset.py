@@ -1,4 +1,4 @@
-"""Files of each kind have the variables and attributes that users' programs know: `datasets.txt` has them."""
+"""Files of each kind have the variables and attributes that users' programs rely on, as listed in `datasets.txt`."""
 
 from __future__ import annotations
 

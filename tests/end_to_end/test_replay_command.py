@@ -1,4 +1,4 @@
-"""`vibroimpact replay` as a person uses it, on a recording that the test makes itself."""
+"""`vibroimpact replay` as a user calls it, on a recording made by the test itself."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIME = 2e-5 * np.arange(900)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A scene, and two recordings of a board that rings at 812 Hz: pulses of two sizes."""
+    """Return a folder with a scene and two recordings of a board that rings at 812 Hz: pulses of two sizes."""
     home = tmp_path_factory.mktemp("replay")
     (home / "board.toml").write_text(BOARD)
     for name, size in (("one", 4000.0), ("two", 2500.0)):

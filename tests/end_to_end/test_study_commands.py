@@ -1,4 +1,4 @@
-"""`vibroimpact accuracy` and `effects`: tables, datasets, figures, a tuned scene; and what they refuse."""
+"""`vibroimpact accuracy` and `effects`: tables, datasets, figures, a tuned scene; and their refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points in lanes are those of the scalar engine to rounding, and the same bits however they are cut."""
+"""Points in lanes equal those of the scalar engine up to rounding, and have the same bits for any cut."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 RIGID = tuple(law for law in LAWS if "kelvin_voigt" not in law)
 FIRST_IMPACTS = 10
-"""Impacts of a point that are compared: a chaotic motion multiplies rounding by what it likes later."""
+"""Number of compared impacts of a point: later, chaotic motion multiplies rounding by any factor."""
 AGREEMENT = 1e-9
-"""Difference of their times and velocities: rounding, multiplied by some impacts."""
+"""Largest difference of their times and velocities: rounding, multiplied by some impacts."""
 
 
 def rows_of(scene: Scene, cuts: Sequence[int] = ()) -> xr.Dataset:
-    """Return the rows of a scene, its points cut where it is said, as the chunks of a campaign are."""
+    """Return the rows of a scene, its points cut at the given places, like the chunks of a campaign."""
     edges = [0, *cuts, run_count(scene.sweep)]
     points = columns_of_points(expand(scene), 0, edges[-1])
     pieces: list[RunColumns] = []
@@ -47,7 +47,7 @@ def first_impacts(rows: xr.Dataset, run: int) -> NDArray[np.float64]:
 
 
 def few_impacts(rows: xr.Dataset) -> NDArray[np.bool_]:
-    """Return which runs are known to have few impacts in all that was recorded."""
+    """Return a mask of the runs with few impacts in the whole recording."""
     if "impact_count" in rows:
         return np.asarray(rows.impact_count.values <= FIRST_IMPACTS)
     if "impacts_per_period" in rows:

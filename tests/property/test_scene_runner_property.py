@@ -1,4 +1,4 @@
-"""A scene as a function gives the bits of its runs, whatever values its keys take."""
+"""A scene as a function gives the bits of its runs, for any values of its keys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RANGES = {
     "stop[1].position": (0.2, 2.0),
     "stop[1].restitution": (0.0, 1.0),
 }
-"""Keys with the least and the largest of their drawn values."""
+"""Keys with the smallest and the largest of their drawn values."""
 
 
 @st.composite

@@ -1,6 +1,6 @@
 """Recordings of laboratories, imported: the facts that were found by hand in each, and its traps.
 
-The numbers are those of the notes beside the recordings, and of plain `numpy.loadtxt` on the files.
+The numbers come from the notes next to the recordings, and from plain `numpy.loadtxt` on the files.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def test_the_shaker_s_conflicting_clocks_are_told_with_their_uncertainty(impact:
     assert "0.000586, 0.000606 s an interval in the header, 0.000605 s in the column of instants" in told
     assert "uncertain by 3.3%" in told
     assert "unit s, which is that of time: not believed" in told
-    # the command is a sine of 5 Hz, within what its clocks leave open
+    # the command is a sine of 5 Hz, up to the difference of its clocks
     spectrum = np.abs(np.fft.rfft(command.values * np.hanning(len(command.values))))
     frequency = np.argmax(spectrum[1:]) + 1
     assert frequency * command.axis.rate / len(command.values) == pytest.approx(5.0, abs=0.165)
