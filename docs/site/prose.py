@@ -1,6 +1,6 @@
-"""Measure the prose of pages, docstrings and comments: `python docs/site/prose.py [PATH ...]` lists what breaks a rule.
+"""Measure the prose of pages, docstrings and comments: `python docs/site/prose.py [PATH ...]` lists broken rules.
 
-The rules stand in CONTRIBUTING.md. Sentences have at most 25 words, paragraphs at most 500 characters, and no comment
+The rules are in CONTRIBUTING.md. Sentences have at most 25 words, paragraphs at most 500 characters, and no comment
 begins with a relative that hides its noun. The last line gives the mean length of a sentence on the pages.
 """
 
@@ -28,13 +28,13 @@ HIDDEN_NOUN = re.compile(
 ABBREVIATIONS = re.compile(
     r"\b(e\.g|i\.e|cf|vs|eqs?|[Ff]igs?|[Ss]ec|[Nn]o|pp?|[Vv]ol|al|approx|resp|Dr|Prof)\.$"
 )
-#: A pragma is no prose.
+#: Begin of a pragma, which is no prose.
 PRAGMA = re.compile(r"(noqa|type:|ruff:|mypy:|pragma:|fmt:|clang-format|!)")
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A paragraph of a file: its first line, its text without marks, and whether it is a comment's first."""
+    """A paragraph of a file: its first line, its text without marks, and whether it opens a comment."""
 
     path: Path
     line: int
@@ -66,12 +66,12 @@ class Paragraph:
 
 
 def words_in(text: str) -> int:
-    """Return the number of words of a text: those with a letter or a digit."""
+    """Return the number of words of a text: only words with a letter or a digit count."""
     return sum(any(map(str.isalnum, word)) for word in text.split())
 
 
 def plain(text: str) -> str:
-    """Return a text without marks: a link is its text, a code span and a formula are one word."""
+    """Return a text without marks: a link becomes its text, a code span or a formula becomes one word."""
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r"(`+)(.+?)\1", "code", text)
     text = re.sub(r"\$[^$]+\$", "formula", text)
@@ -82,7 +82,7 @@ def plain(text: str) -> str:
 
 
 def paragraphs_of_page(path: Path, text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs and list items of a page; headings, tables, blocks, formulas and quotations are none."""
+    """Yield the paragraphs and list items of a page, without headings, tables, blocks, formulas and quotations."""
     fence = ""
     begun: list[str] = []
     first = 0
@@ -118,7 +118,7 @@ def paragraphs_of_page(path: Path, text: str) -> Iterator[Paragraph]:
 
 
 def paragraphs_of_comment(path: Path, line: int, text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs of a comment or a docstring; examples, headings of sections and names of fields are none."""
+    """Yield the paragraphs of a comment or a docstring, without examples, headings of sections and names of fields."""
     begun: list[str] = []
     first, depth, opens, in_example = line, 0, True, False
     lines = text.expandtabs().splitlines()
@@ -168,7 +168,7 @@ def paragraphs_of_python(path: Path, text: str) -> Iterator[Paragraph]:
 
 
 def _joined(path: Path, lines: Iterable[tuple[int, int, bool, str]]) -> Iterator[Paragraph]:
-    """Yield the paragraphs of comments, given as line, column, whether it stands alone, and text."""
+    """Yield the paragraphs of comments; a comment is line, column, whether it stands alone, and text."""
     begun: list[str] = []
     start = last = place = 0
     for number, column, is_alone, said in lines:
@@ -214,7 +214,7 @@ def paragraphs_of(path: Path) -> Iterator[Paragraph]:
 
 
 def files(paths: Iterable[Path] = ()) -> list[Path]:
-    """Return the files with prose that git knows, all of them or those below the paths."""
+    """Return the files with prose that git knows: all of them, or those below the paths."""
     named = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "--", *map(str, paths)],
         cwd=ROOT,

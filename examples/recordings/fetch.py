@@ -1,8 +1,8 @@
-"""Fetch the recordings of docs/recordings from where their makers keep them.
+"""Fetch the recordings of docs/recordings from the places where their makers keep them.
 
-`python examples/recordings/fetch.py --list` shows them; it needs `pip install 'vibroimpact[recordings]'`. Each file is
-taken from one commit of its repository and compared with its SHA-256, so that it is the file that the pages speak of.
-None is part of this project; each has the licence named here.
+`python examples/recordings/fetch.py --list` shows them; it needs `pip install 'vibroimpact[recordings]'`. Each file
+comes from one commit of its repository, and its SHA-256 is checked: it is the file that the pages describe. None is
+part of this project; each has the licence named here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class File:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a recording comes from, and under which licence."""
+    """Origin of a recording, and its licence."""
 
     repository: str
     commit: str
@@ -172,7 +172,7 @@ SOURCES = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Fetch what was asked for; return 0 where all of it is there, 1 where a download failed, 2 on misuse."""
+    """Fetch the named recordings; return 0 if all of them are there, 1 if a download failed, 2 for misuse."""
     parser = argparse.ArgumentParser(
         description="Fetch recordings made in laboratories, each under its own licence."
     )
@@ -215,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 pooch.retrieve(
                     address, f"sha256:{file.sha256}", file.name, path=given.output, downloader=downloader
                 )
-            # OSError: what requests raises where the network fails, and the disk; ValueError: another SHA-256
+            # OSError: requests and the disk raise it; ValueError: another SHA-256
             except (OSError, ValueError) as problem:
                 return _told(
                     f"{address}: cannot be fetched as {given.output / file.name}: {_one_line(problem)}",

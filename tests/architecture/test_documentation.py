@@ -1,4 +1,4 @@
-"""Pages lead to each other, and their lines can be read: no link into nowhere, no page that nobody finds."""
+"""Links of pages and their lines: no link leads nowhere, every page is linked, and no line is too long."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `make` offers is what it says it does."""
+"""The targets of `make` do what their help says."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="there is n
 
 
 def make(*arguments: str) -> subprocess.CompletedProcess[str]:
-    # the make that runs these tests hands down what it was given
+    # the make that runs these tests passes its own variables on
     theirs = ("MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES", "MAKELEVEL", "PYTHON", "VENV", "INSTALL")
     environment = {name: value for name, value in os.environ.items() if name not in theirs}
     return subprocess.run(

@@ -1,4 +1,4 @@
-"""The table of what became of NI's tests, file by file."""
+"""The table of the outcomes of NI's tests, file by file."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ HEADING = "## NI's own tests"
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a test.
+    """Outcome of a test.
 
     Attributes
     ----------
     test : str
-        pytest's name of it, with the path of its file.
+        Name of the test for pytest, with the path of its file.
     outcome : str
-        `passed`, `failed`, `skipped` (by NI: it needs another device), or `refused`: the rig has no model of it.
+        `passed`, `failed`, `skipped` (by NI: it needs another device), or `refused` (the rig does not model it).
     said : str
         The first line of the error.
     """
@@ -32,12 +32,12 @@ class Outcome:
 
     @property
     def file(self) -> str:
-        """Its file, below the folder of component tests."""
+        """File of the test, below the folder of component tests."""
         return self.test.split("::")[0].removeprefix("tests/component/")
 
 
 def one_for_each(outcomes: Iterable[Outcome]) -> list[Outcome]:
-    """Return the worst outcome of each test, of which set-up, call and end have one each."""
+    """Return the worst outcome of each test: set-up, call and end have one outcome each."""
     worst = ("failed", "refused", "skipped", "passed")
     found: dict[str, Outcome] = {}
     for outcome in outcomes:
@@ -48,7 +48,7 @@ def one_for_each(outcomes: Iterable[Outcome]) -> list[Outcome]:
 
 
 def failures(outcomes: Iterable[Outcome]) -> list[Outcome]:
-    """Return the tests that fail and may not."""
+    """Return the tests that fail without being allowed to."""
     return [each for each in outcomes if each.outcome == "failed" and reason_not_met(each.test) is None]
 
 
@@ -93,7 +93,7 @@ def section(outcomes: Iterable[Outcome], client: str, commit: str) -> str:
 
 
 def write_section(page: Path, text: str) -> None:
-    """Put the section into a page, in the place of the one that is there."""
+    """Replace the section in a page."""
     whole = page.read_text(encoding="utf-8")
     before, there, rest = whole.partition(HEADING)
     _, following, after = rest.partition("\n## ")

@@ -1,4 +1,4 @@
-"""examples/recordings/fetch.py gets what the pages name, whole or not at all, from a server on this machine."""
+"""examples/recordings/fetch.py gets the files of the pages, whole or not at all, from a server on this machine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ASKED = "/somebody/rig/0123abcd/data/set #1/hit 1.txt"
 
 @pytest.fixture
 def fetch(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Return the script, which knows one recording of one file."""
+    """Return the script with a single recording of a single file."""
     spec = importlib.util.spec_from_file_location("fetch", ROOT / "examples" / "recordings" / "fetch.py")
     assert spec is not None
     assert spec.loader is not None
@@ -39,7 +39,7 @@ def one_file(fetch: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Server(HTTPServer):
-    """Serves one file; remembers what it was asked for."""
+    """Serves one file; stores the requests."""
 
     content = CONTENT
     asked: list[str]
@@ -58,7 +58,7 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(self.server.content)
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Say nothing."""
+        """Write no log."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What a forge and pre-commit read is valid, and names targets, programs and versions that are there."""
+"""Files for a forge and pre-commit are valid, and name existing targets, programs and versions."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_workflow_asks_for_pythons_that_the_package_allows_the_oldest_among_
 
 def test_long_series_run_each_week_and_no_push_waits_for_them() -> None:
     workflow = read(WORKFLOW)
-    # YAML takes the word for a truth
+    # YAML reads the key `on` as true
     assert workflow[True]["schedule"] == [{"cron": "17 2 * * 6"}]
     assert workflow["jobs"]["soak"]["if"] == "github.event_name == 'schedule'"
     assert {"run": "make soak", "env": {"MINUTES": 240}} in workflow["jobs"]["soak"]["steps"]

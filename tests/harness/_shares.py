@@ -1,4 +1,4 @@
-"""Shares of the tests: groups stay together where that costs no time, the dearest begin first."""
+"""Shares of the tests: groups stay together where that costs no time, and the most expensive ones start first."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from collections.abc import Collection, Mapping, Sequence
 class Shares:
     """Hands out numbers of tests to workers.
 
-    A worker follows one group to its end, so that what its tests share is made once, and then takes the dearest group
-    that nobody has begun. Where none is left it takes the second half of what the busiest worker still has.
+    A worker follows one group to its end, so that shared fixtures are made once. Then it takes the most expensive
+    group that no worker has started. Without such a group it takes the second half of the busiest worker's tests.
 
     Parameters
     ----------
     groups : sequence of str
         The group of each test, such as its module, in the order of collection.
     seconds : mapping of str to float
-        Wall time of a group, s, as far as it is known; others count as nothing.
+        Wall time of a group, s; a group without a known time counts as 0.
     workers : int
     whole : collection of str
-        Groups that one worker runs alone.
+        Groups that are not shared among workers.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Shares:
         return sum(self._each[number] for number in group)
 
     def next(self, worker: int) -> int | None:
-        """Return the test that a worker runs next; None if nothing is left for it."""
+        """Return the next test of a worker; None if no test is left for it."""
         own = self._begun[worker]
         if not own and self._waiting:
             own.extend(self._waiting.popleft())
@@ -59,5 +59,5 @@ class Shares:
             own.appendleft(busiest.pop())
 
     def give_back(self, worker: int, number: int) -> None:
-        """Take back a test that a worker has not begun."""
+        """Take back a test that a worker has not started."""
         self._begun[worker].appendleft(number)

@@ -1,4 +1,4 @@
-"""Costs of tests in a run with `--keep-costs`: the order of modules and the choice of `--fast` follow from them."""
+"""Costs of tests in a run with `--keep-costs`: they decide the order of modules and the choice of `--fast`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ FILE = Path(__file__).with_name("costs_of_tests.json")
 DEAR = 0.15
 """Processor time of a test, its fixtures and its programs, s, above which `--fast` leaves it out."""
 DEAR_FIXTURE = 2.0
-"""Processor time of a test, s, above which it may have made what other tests of its module use, too.
+"""Processor time of a test, s, above which it may have made fixtures that other tests of its module use, too.
 
-Such a module is not shared out among workers, each of which would make it again, and `--fast` leaves all of it out.
+The tests of such a module stay with one worker, since each worker would make the fixtures again. `--fast` leaves out
+all of them.
 """
 SHORT = 0.1
 """Wall time of a module, s, below which its place in the order does not matter."""
@@ -31,7 +32,7 @@ def seconds_of_modules() -> dict[str, float]:
 
 
 def dear_tests() -> dict[str, float]:
-    """Return the processor time of each test that took more than `DEAR`, s, by its name for pytest."""
+    """Return the processor time of each test above `DEAR`, s, by its name for pytest."""
     return dict(_kept().get("dear", {}))
 
 

@@ -1,4 +1,4 @@
-"""`make coverage`: 480 records, side by side; resumable; exit code 1 where a target is missed. SEED= RECORDS="""
+"""`make coverage`: 480 records, side by side; resumable; exit code 1 if a target is missed. SEED= RECORDS="""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from interval_coverage._table import Line, again, shares, table_of, thin
 
 SEED, RECORDS = 7, 480
 DRAWS = 7
-"""Further draws of the noise of records whose cell of the table has few intervals."""
+"""Number of further noises for the records of a table cell with few intervals."""
 Place = tuple[int, int]
-"""Case, and draw of its noise."""
+"""Number of the case, and of the draw of its noise."""
 
 
 def main() -> int:
-    """Ask all that the journal does not hold, further noises where a cell has few intervals, and print the table."""
+    """Estimate all records outside of the journal, and further noises for cells with few intervals; print the table."""
     seed, count = int(os.environ.get("SEED") or SEED), int(os.environ.get("RECORDS") or RECORDS)
     console = Console(width=110)
     path = ROOT / "results" / "coverage" / f"seed-{seed}-{state_of_the_code()}.jsonl"
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def read(path: Path) -> dict[Place, Line]:
-    """Return the whole lines of a journal by case and draw; one that was cut off is asked again."""
+    """Return the complete lines of a journal by case and draw; a truncated line is computed again."""
     if not path.exists():
         return {}
     text = path.read_text(encoding="utf-8")

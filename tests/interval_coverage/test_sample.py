@@ -1,4 +1,4 @@
-"""Twelve short records of `make coverage`, eight plain ones and one of each kind that is spoiled."""
+"""Twelve short records of `make coverage`: eight plain ones and one of each spoiled kind."""
 
 import math
 from dataclasses import replace
@@ -33,7 +33,7 @@ def test_intervals_of_plain_records_hold_the_truth():
     assert sum({"weak_form", "trajectory"} <= set(one["sure"]) for one in lines) >= 7
     held = [share for share in shares(lines) if share.low == HELD[0]]
     hits, total = sum(share.hits for share in held), sum(share.total for share in held)
-    # intervals of one record are correlated: about two records' worth may miss at once
+    # intervals of one record are correlated: those of about two records may miss at once
     assert total > 80
     assert hits > 0.85 * total
 
@@ -79,7 +79,7 @@ def test_coverage_is_told_by_region_with_the_error_that_records_leave():
     found = {share.what: share for share in shares(lines)}
     one = found[f"{REGIONS[1]}: intervals"]
     assert (one.hits, one.total, one.low, one.high) == (48, 60, *HELD_IN_REGION)
-    # as many intervals as a record has miss at once: ten records, not sixty intervals
+    # all intervals of a record miss at once: ten records, not sixty intervals
     assert one.error == pytest.approx(math.sqrt(0.8 * 0.2 / 10))
     assert not one.missed
     assert replace(one, error=0.02).missed
