@@ -69,13 +69,18 @@ def section(outcomes: Iterable[Outcome], client: str, commit: str) -> str:
         if why:
             reasons[why] += 1
     total = sum(numbers.values(), Counter())
-    head = (
-        "`make conformance NI_TESTS=...` runs `tests/component` of a checkout of ni/nidaqmx-python on the virtual rig,"
-        f"\nunmodified, through NI's client. Last run: their commit {commit}, nidaqmx {client}: "
-        f"{total['passed']} pass,\n{total['refused']} meet a refusal with -200452 (the rig has no model of what they "
-        f"want), {total['skipped']} are skipped by NI's own fixtures\n(they look for another device), "
-        f"{total['not met']} do not apply (below), {total['failed']} fail."
-    )
+    head = [
+        "`make conformance NI_TESTS=...` runs `tests/component` of a checkout of ni/nidaqmx-python on the virtual rig,",
+        f"unmodified, through NI's client. Last run: their commit {commit}, nidaqmx {client}.",
+        "",
+        "| outcome | tests |",
+        "|---|---|",
+        f"| pass | {total['passed']} |",
+        f"| refused with -200452 (the rig has no model of the call) | {total['refused']} |",
+        f"| skipped by NI's own fixtures (they look for another device) | {total['skipped']} |",
+        f"| do not apply (below) | {total['not met']} |",
+        f"| fail | {total['failed']} |",
+    ]
     columns = ("passed", "refused", "skipped", "not met", "failed")
     rows = [
         f"| `{file}` | " + " | ".join(str(count[name] or "") for name in columns) + " |"
@@ -88,7 +93,7 @@ def section(outcomes: Iterable[Outcome], client: str, commit: str) -> str:
     ]
     why = [f"- {count}: {reason}." for reason, count in sorted(reasons.items())]
     left_out = [f"- {reason}." for reason in dict.fromkeys(NOT_RUN.values())]
-    parts = [HEADING, "", head, "", *table, "", "Do not apply:", "", *why, "", "Files that are not run:", ""]
+    parts = [HEADING, "", *head, "", *table, "", "Do not apply:", "", *why, "", "Files that are not run:", ""]
     return "\n".join([*parts, *left_out]) + "\n"
 
 

@@ -99,7 +99,7 @@ def _references(record: Mapping[str, Any]) -> str:
 
 
 def _growth(record: Mapping[str, Any]) -> str:
-    """Return a table of the error in chaotic motion from impact to impact, for each way at its finest setting."""
+    """Return the error of chaotic motion from impact to impact, of each way at its finest setting."""
     finest = {row["way"]: row for row in record["rows"] if row["growth"] and not row["failure"]}
     most = max((len(row["growth"]) for row in finest.values()), default=0)
     lines = [
