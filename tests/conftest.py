@@ -39,7 +39,7 @@ FAST_FOLDERS = ("architecture", "unit")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are neither dear nor long"
+    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are neither expensive nor long"
     parser.addoption("--fast", action="store_true", help=text)
     where = "a board for the tests of rigs: Dev1 of this machine, or grpc://HOST:PORT/Dev1"
     parser.addoption("--real-rig", metavar="BOARD", help=where)

@@ -178,10 +178,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="recordings to fetch; none: all")
     parser.add_argument(
-        "-o", "--output", type=Path, default=Path(), help="folder to put them into; else this one"
+        "-o", "--output", type=Path, default=Path(), help="folder for the files; the current one by default"
     )
-    parser.add_argument("--list", action="store_true", help="show what there is, and fetch nothing")
-    parser.add_argument("--server", default=SERVER, help="a mirror that has the same paths")
+    parser.add_argument("--list", action="store_true", help="list the recordings, and fetch nothing")
+    parser.add_argument("--server", default=SERVER, help="a mirror with the same paths")
     given = parser.parse_args(arguments)
     unknown = [name for name in given.names if name not in SOURCES]
     if unknown:

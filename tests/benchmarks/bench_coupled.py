@@ -512,7 +512,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="folder of the results")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     load = f", load {os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else ""

@@ -22,7 +22,7 @@ KEPT = Path(__file__).with_name("budget.toml")
 DEAREST = 20
 MAY_GROW = 0.1
 """Share of the stored figure by which processor time may grow."""
-SHARED = "what tests share: services, clusters, folders"
+SHARED = "shared fixtures: services, clusters, folders"
 """Entry among the most expensive tests for the end of fixtures that outlive a worker's last test."""
 EVERY = 20.0
 """Wall time between two yardsticks of a worker, s."""
@@ -102,9 +102,9 @@ TOTAL = pytest.StashKey[tuple[float, float]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = "end in an error where the processor time of all tests is above the kept figure; list the dearest"
+    text = "fail if the processor time of all tests exceeds the stored figure; list the most expensive tests"
     parser.addoption("--budget", action="store_true", help=text)
-    text = f"write {kept_costs.FILE.name}: the order of modules, and what --fast leaves out"
+    text = f"write {kept_costs.FILE.name}: the order of modules, and the tests that --fast leaves out"
     parser.addoption("--keep-costs", action="store_true", help=text)
 
 

@@ -44,11 +44,11 @@ def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = "run the tests in so many forked copies of this process, where it can be forked"
+    text = "number of forked copies of this process that run the tests, if it can be forked"
     parser.addoption("--side-by-side", type=int, default=0, metavar="N", help=text)
-    text = "beside --side-by-side: begin the modules in an order that is drawn, by this seed"
+    text = "with --side-by-side: start the modules in a random order, drawn with this seed"
     parser.addoption("--drawn-order", type=int, metavar="SEED", help=text)
-    text = "beside --side-by-side: start every program anew, and none as a copy of a warm process"
+    text = "with --side-by-side: start every program cold, and none as a copy of a warm process"
     parser.addoption("--cold", action="store_true", help=text)
 
 
