@@ -26,7 +26,7 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
     """Adds binaries for this machine, which the sources do not have."""
 
     def dependencies(self) -> list[str]:
-        """Return a compiler as a requirement if this machine has none."""
+        """Return a compiler as a requirement if this machine has none, or for a release."""
         self._make_importable()
         from vibroimpact.fmus.packaging.compiler import has_compiler
 

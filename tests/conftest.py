@@ -69,7 +69,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _left_out(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Return the expensive and long tests, and modules with an expensive fixture; every room keeps some tests."""
+    """Return the expensive and long tests, and those of modules with an expensive fixture; every room keeps some."""
     costs, whole = dear_tests(), whole_modules()
     short = [item for item in items if not item.get_closest_marker("long")]
     cheap = [item for item in short if item.nodeid not in costs]

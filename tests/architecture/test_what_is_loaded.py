@@ -156,7 +156,7 @@ WARM = OTHERS | {f"vi.{name}": (NAMES.get(name, ""), 0) for name in dir(vi)} | C
 
 @pytest.fixture(scope="module")
 def loaded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, set[str], str]]:
-    """Return exit code, newly loaded modules, and the end of the output for each row."""
+    """Return for each row exit code, modules that the rows before it in its group had not loaded, end of output."""
     folder = tmp_path_factory.mktemp("loaded")
     for name, text in (("scene", SCENE), ("swept", SCENE + SWEEP), ("drawn", SCENE + DRAWN)):
         (folder / f"{name}.toml").write_text(text)

@@ -3,7 +3,7 @@
 - Thesis figure 3.3, up and down, to 1e-5: adaptive from 51 and from 401 values each way, and uniform with 200,002
   points. Each jump of the uniform sweep is compared with the nearest bracket between the same two motions.
 - A map over frequency and gap, from rest, to 0.002 and 0.004, and a uniform map of its finest cells with 328,833
-  points. The counts are pairs of neighbours between which the motion jumps, and those inside the adaptive map.
+  points. The counts are neighbours between which the motion jumps, and pairs with both points in the adaptive map.
 
 The output is the table of jumps, the two pictures of docs/campaigns.md and a sentence for each. On two cores it takes
 some eight minutes and 1 GB of memory; `--quick` makes steps and cells eight times as wide.

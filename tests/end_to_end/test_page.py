@@ -23,7 +23,7 @@ LONG = sweep_text(400, 1_000_000)
 MAP = sweep_text(6, 20) + (
     '"stop[1].position" = { values = [0.0, 0.5, 1.0] }\n[execution]\nimpact_limit = 30\n'
 )
-"""A scene of 18 points, 4 of them with too many impacts: those with the stop at 0."""
+"""A scene of 18 points; 4 of its points with the stop at 0 have too many impacts."""
 POINT = re.compile("^Point [0-9]+$")
 CLASS_NAME = re.compile(r"P\(|chaos|unknown|no impacts")
 WRONG = "[body]\nstiffness = 1\nmass = -1\n[record]\nrecorded_time = 5\n"

@@ -220,7 +220,7 @@ def test_a_stateless_spring_is_off_at_its_first_contact_by_the_first_step_alone(
     importer.begin()
     importer.advance(1.5)
     velocity = float(importer.components["b"].group("Float64", ["velocity"]).get()[0])
-    # a first step h' <= h through the stop without force: the body gets the energy (w h')^2 / 2 of the impact back
+    # a first step h' <= h goes into the stop without force: later the stop returns (w h')^2 / 2 that it never took
     assert 0.0 <= velocity**2 - 1.0 <= (math.pi / steps) ** 2
     importer.free()
 

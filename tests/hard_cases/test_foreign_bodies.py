@@ -111,7 +111,7 @@ def test_a_mass_pressed_between_two_stops_at_once_keeps_its_energy(tmp_path: Pat
 def test_the_residual_of_a_mass_that_cannot_go_back_is_the_energy_that_it_has_gained(
     tmp_path: Path, macro_step: float
 ) -> None:
-    # with a spring of its own the accelerations in a step are extrapolated, and the true ones differ
+    # with a spring of its own the accelerations in a step are predicted, and the true ones differ
     stop = yielding_stop("s", "hertz", ELASTIC["hertz"], 0.1)
     run = held(tmp_path, [stop], {"v": 2.0, "k": 100.0}, states=False, macro_step=macro_step)
     displacement, velocity = run.motion(2.0)
@@ -292,7 +292,7 @@ def test_a_run_begun_again_is_the_same_run(tmp_path: Path) -> None:
 
 
 def test_a_body_of_ours_may_be_a_foreign_one(tmp_path: Path) -> None:
-    # a stop of FMI 3.0 with event mode; the body's spring turns it round after the contact
+    # the body is an FMU of FMI 3.0 with event mode; its spring turns it round after the contact
     start = {"stiffness": 4.0, "velocity_start": 3.0}
     contact = StopContactSpec("b", "displacement", "velocity", "force", "s")
     importer = Importer(

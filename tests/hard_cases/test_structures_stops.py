@@ -250,7 +250,7 @@ def test_two_masses_let_go_at_one_instant_write_one_stick_each() -> None:
 @pytest.mark.parametrize("before", [0.0, 1e-1, 1e-5, 1e-6, 3e-7, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15])
 @pytest.mark.parametrize("law", ["restitution", "kelvin_voigt"])
 def test_stops_at_one_place_let_a_body_go_as_one_in_any_steps(before: float, law: str) -> None:
-    # the shares of the force are known only to a millionth, which is enough for the time of the first release
+    # the first release depends on shares of the force, which are known only to a millionth
     yields = Stop([1.0], 0.0, law=law, stiffness=1e9)
     ends = []
     for stops in ([Stop([1.4], 0.0)], [Stop([1.4], 0.0), Stop([0.72], 0.0, restitution=0.9), yields]):

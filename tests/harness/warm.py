@@ -240,7 +240,7 @@ class Copy:
         return told.get(self.stdout, ""), told.get(self.stderr, "")
 
     def send_signal(self, number: int) -> None:
-        """Send a signal, unless the program has ended, even if nobody has asked for its end yet."""
+        """Send a signal, unless the program has ended, even if its end was not noticed before."""
         if self.poll() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, number)

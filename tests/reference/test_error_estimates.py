@@ -1,4 +1,4 @@
-"""The estimated error of a study's reference holds against the same motion in 40 digits, for all such kinds."""
+"""The estimated error of a study's reference holds against the same motion in 40 digits, for each solvable kind."""
 
 from __future__ import annotations
 

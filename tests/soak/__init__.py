@@ -6,7 +6,7 @@ A kind is a module of this folder whose name does not begin with `_` or `test_`:
 
 - `CASES = 5000`: number of cases of `make soak`; 5,000 where it is left out
 - `SAMPLE = 40`: number of cases of `make test`; all kinds together take less than a minute
-- `SECONDS = 20.0`: processor time after which a case counts as hanging; five times this wall time counts as well
+- `SECONDS = 20.0`: processor time after which a case counts as hanging; five times as much wall time does as well
 - `check(seed: int) -> str | None`: makes and tries the case of a seed; returns None, or the problem in one line
 
 Kinds `grammar_*` draw files, documents and requests by the grammar of each format (`_drawn_files`). Sound input is

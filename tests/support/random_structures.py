@@ -17,7 +17,7 @@ RIGID, COMPLIANT = ("restitution",), ("kelvin_voigt", "hertz", "hunt_crossley")
 ALL_LAWS = RIGID + COMPLIANT
 POWER = ("hertz", "hunt_crossley")
 MOST_IMPACTS = 3000
-"""Largest number of impacts of one run: an elastic body pressed to its stop may bounce for ever. Later ones are cut."""
+"""Largest number of impacts of one run: an elastic body pressed to its stop may bounce for ever. The rest is cut."""
 
 
 def depth_at(stop: Stop, q: Array) -> float:

@@ -38,7 +38,7 @@ class Phase(IntEnum):
     PRESSED = 2
     """In contact with a compliant stop."""
     SLACK = 3
-    """Separated from a compliant stop that has not yet relaxed to its rest position."""
+    """Separated from a compressed compliant stop, but still beyond the stop's rest position."""
 
 
 @dataclass(frozen=True)
