@@ -13,7 +13,7 @@ from typing import Any
 import hypothesis
 import pytest
 from _pytest.doctest import DoctestModule
-from harness.kept_costs import DEAR_FIXTURE, dear_tests, whole_modules
+from harness.kept_costs import EXPENSIVE_FIXTURE, expensive_tests, whole_modules
 from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
@@ -64,25 +64,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = _left_out(items)
     config.stash[LEFT_OUT] = len(left_out)
     config.hook.pytest_deselected(items=left_out)
-    those = set(left_out)
-    items[:] = [item for item in items if item not in those]
+    excluded = set(left_out)
+    items[:] = [item for item in items if item not in excluded]
 
 
 def _left_out(items: list[pytest.Item]) -> list[pytest.Item]:
     """Return the expensive and long tests, and those of modules with an expensive fixture; every room keeps some."""
-    costs, whole = dear_tests(), whole_modules()
+    costs, whole = expensive_tests(), whole_modules()
     short = [item for item in items if not item.get_closest_marker("long")]
     cheap = [item for item in short if item.nodeid not in costs]
     stay: list[pytest.Item] = []
     for chosen in (
         [item for item in cheap if item.nodeid.partition("::")[0] not in whole],
         cheap,
-        [item for item in short if costs.get(item.nodeid, 0.0) < DEAR_FIXTURE],
+        [item for item in short if costs.get(item.nodeid, 0.0) < EXPENSIVE_FIXTURE],
     ):
         rooms = {item.path.parent for item in stay}
         stay += [item for item in chosen if item.path.parent not in rooms]
-    those = set(stay)
-    return [item for item in items if item not in those]
+    staying = set(stay)
+    return [item for item in items if item not in staying]
 
 
 def _seed(config: pytest.Config) -> int | str:
@@ -160,7 +160,7 @@ def pytest_taken_over(config: pytest.Config, given: dict[str, Any]) -> None:
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Write the numbers of tried examples and of left-out tests."""
-    _tell_examples(terminalreporter, config)
+    _write_examples(terminalreporter, config)
     if config.getoption("fast"):
         folders = sorted({path.relative_to(TESTS).parts[0] for path in TESTS.glob("*/**/test_*.py")})
         left_out = [f"tests/{folder}" for folder in folders if folder not in FAST_FOLDERS]
@@ -170,7 +170,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         )
 
 
-def _tell_examples(terminalreporter: Any, config: pytest.Config) -> None:
+def _write_examples(terminalreporter: Any, config: pytest.Config) -> None:
     counts = config.stash.get(COUNTS, {})
     if not counts:
         return

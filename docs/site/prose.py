@@ -45,13 +45,13 @@ class Paragraph:
     def sentences(self) -> list[str]:
         """Sentences of the text, in order."""
         found: list[str] = []
-        begun = ""
+        pending = ""
         for piece in re.split(r"(?<=[.!?])[)\"'*_]*\s+", self.text):
-            begun = f"{begun} {piece}".strip()
-            if not ABBREVIATIONS.search(begun):
-                found.append(begun)
-                begun = ""
-        return [sentence for sentence in (*found, begun) if words_in(sentence)]
+            pending = f"{pending} {piece}".strip()
+            if not ABBREVIATIONS.search(pending):
+                found.append(pending)
+                pending = ""
+        return [sentence for sentence in (*found, pending) if words_in(sentence)]
 
     def faults(self) -> Iterator[str]:
         """Yield each rule that the paragraph breaks, with the words that break it."""
@@ -84,13 +84,13 @@ def plain(text: str) -> str:
 def paragraphs_of_page(path: Path, text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs and list items of a page, without headings, tables, blocks, formulas and quotations."""
     fence = ""
-    begun: list[str] = []
+    pending: list[str] = []
     first = 0
 
     def taken() -> Iterator[Paragraph]:
-        if words := plain("\n".join(begun)):
+        if words := plain("\n".join(pending)):
             yield Paragraph(path, first, words)
-        begun.clear()
+        pending.clear()
 
     text = re.sub(r"<!--.*?-->", lambda found: "\n" * found.group().count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(text.splitlines(), start=1):
@@ -111,24 +111,24 @@ def paragraphs_of_page(path: Path, text: str) -> Iterator[Paragraph]:
         if item:
             yield from taken()
             bare = bare[item.end() :]
-        if not begun:
+        if not pending:
             first = number
-        begun.append(bare)
+        pending.append(bare)
     yield from taken()
 
 
 def paragraphs_of_comment(path: Path, line: int, text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs of a comment or a docstring, without examples, headings of sections and names of fields."""
-    begun: list[str] = []
+    pending: list[str] = []
     first, depth, opens, in_example = line, 0, True, False
     lines = text.expandtabs().splitlines()
 
     def taken() -> Iterator[Paragraph]:
         nonlocal opens
-        if words := plain("\n".join(begun)):
+        if words := plain("\n".join(pending)):
             yield Paragraph(path, first, words, opens)
             opens = False
-        begun.clear()
+        pending.clear()
 
     for number, each in enumerate(lines):
         bare, indent = each.strip(), len(each) - len(each.lstrip())
@@ -140,13 +140,13 @@ def paragraphs_of_comment(path: Path, line: int, text: str) -> Iterator[Paragrap
         if not bare or in_example or is_heading or is_field or bare.startswith("|"):
             yield from taken()
             continue
-        if item or (begun and indent != depth and number > 1):
+        if item or (pending and indent != depth and number > 1):
             yield from taken()
         if item:
             bare = bare[item.end() :]
-        if not begun:
+        if not pending:
             first, depth = line + number, indent
-        begun.append(bare)
+        pending.append(bare)
         if item:
             depth = indent + item.end()
     yield from taken()
@@ -169,18 +169,18 @@ def paragraphs_of_python(path: Path, text: str) -> Iterator[Paragraph]:
 
 def _joined(path: Path, lines: Iterable[tuple[int, int, bool, str]]) -> Iterator[Paragraph]:
     """Yield the paragraphs of comments; a comment is line, column, whether it stands alone, and text."""
-    begun: list[str] = []
+    pending: list[str] = []
     start = last = place = 0
     for number, column, is_alone, said in lines:
-        if begun and not (is_alone and number == last + 1 and column == place):
-            yield from paragraphs_of_comment(path, start, "\n".join(begun))
-            begun.clear()
-        if not begun:
+        if pending and not (is_alone and number == last + 1 and column == place):
+            yield from paragraphs_of_comment(path, start, "\n".join(pending))
+            pending.clear()
+        if not pending:
             start = number
-        begun.append(said)
+        pending.append(said)
         last, place = number, column
-    if begun:
-        yield from paragraphs_of_comment(path, start, "\n".join(begun))
+    if pending:
+        yield from paragraphs_of_comment(path, start, "\n".join(pending))
 
 
 def paragraphs_of_c(path: Path, text: str) -> Iterator[Paragraph]:

@@ -185,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     unknown = [name for name in given.names if name not in SOURCES]
     if unknown:
-        return _told(
+        return _report(
             f"fetch.py: NAME: expected some of {', '.join(SOURCES)}, got {', '.join(unknown)}.", code=2
         )
     chosen = given.names or list(SOURCES)
@@ -196,13 +196,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         import pooch
     except ImportError:
-        return _told(
+        return _report(
             "fetch.py: expected the package pooch, got none. pip install 'vibroimpact[recordings]'", code=2
         )
     for file in (file for name in chosen for file in SOURCES[name].files):
         there = given.output / file.name
         if there.exists() and pooch.file_hash(str(there)) != file.sha256:
-            return _told(
+            return _report(
                 f"{there}: expected the file that is fetched, or none, got another. Move it away.", code=2
             )
     downloader = pooch.HTTPDownloader(timeout=PATIENCE)
@@ -217,7 +217,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 )
             # OSError: requests and the disk raise it; ValueError: another SHA-256
             except (OSError, ValueError) as problem:
-                return _told(
+                return _report(
                     f"{address}: cannot be fetched as {given.output / file.name}: {_one_line(problem)}",
                     code=1,
                 )
@@ -235,7 +235,7 @@ def _one_line(problem: Exception) -> str:
     return " ".join(str(problem).split())
 
 
-def _told(text: str, code: int) -> int:
+def _report(text: str, code: int) -> int:
     print(text, file=sys.stderr)
     return code
 

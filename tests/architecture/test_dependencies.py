@@ -104,7 +104,7 @@ def test_a_hole_fails_and_a_database_out_of_reach_is_said_and_does_not(
     answer = subprocess.CompletedProcess([], expected, stdout=out, stderr=said)
     monkeypatch.setattr(audit.subprocess, "run", lambda *_, **__: answer)
     assert audit.audited("the lowest versions") == expected
-    told = capsys.readouterr()
+    output = capsys.readouterr()
     answered = any("vulns" in one for one in dependencies or [])
-    assert ("could not be reached" in told.err) == (not answered and not expected)
-    assert ("CVE-2025-43859" in told.out) == bool(expected and dependencies)
+    assert ("could not be reached" in output.err) == (not answered and not expected)
+    assert ("CVE-2025-43859" in output.out) == bool(expected and dependencies)

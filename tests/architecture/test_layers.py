@@ -7,7 +7,7 @@ from pathlib import Path
 
 import import_drawing
 import pytest
-from harness.kept_costs import DEAR_FIXTURE, dear_tests
+from harness.kept_costs import EXPENSIVE_FIXTURE, expensive_tests
 from support.places import ROOT
 
 PACKAGES = import_drawing.LAYERS
@@ -107,5 +107,7 @@ def has_quick_tests(path: Path) -> bool:
     """Return whether a module has a test that `make fast` runs when it is the only one of the room."""
     name = path.relative_to(ROOT).as_posix()
     functions = re.findall(r"^def (test\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
-    dear = {one.partition("[")[0] for one, took in dear_tests().items() if took >= DEAR_FIXTURE}
-    return any(f"{name}::{function}" not in dear for function in functions)
+    expensive = {
+        one.partition("[")[0] for one, took in expensive_tests().items() if took >= EXPENSIVE_FIXTURE
+    }
+    return any(f"{name}::{function}" not in expensive for function in functions)

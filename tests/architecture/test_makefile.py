@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from harness.kept_costs import dear_tests
+from harness.kept_costs import expensive_tests
 from support.places import ROOT
 
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")
@@ -69,7 +69,7 @@ def test_the_fast_tests_say_what_they_leave_out() -> None:
     assert result.returncode == 0, result.stdout + result.stderr
     collected = set(result.stdout.splitlines())
     assert "tests/architecture/test_c_rooms.py::test_folders_of_the_core_look_down_only" in collected
-    assert not collected & dear_tests().keys()
+    assert not collected & expensive_tests().keys()
     assert re.search(
         r"^\d+ dear or long tests, and tests/conformance, tests/documentation, tests/end_to_end, .*tests/soak$",
         result.stdout,

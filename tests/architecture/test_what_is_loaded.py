@@ -64,7 +64,7 @@ sample = { design = "saltelli", points = 8, seed = 2 }
 """
 NOWHERE = "http://127.0.0.1:1"
 """Address without a service."""
-ASKED = "dask pint scipy"
+RECOGNIZED = "dask pint scipy"
 """Packages that xarray imports to recognize an array of theirs when it computes; `dask.array` loads scipy."""
 Rows = dict[str, tuple[str, int]]
 LIGHT: Rows = {
@@ -97,23 +97,23 @@ OTHERS: Rows = {
     "run drawn.toml -o drawn.nc": ("scipy", 0),
     "follow scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9": ("scipy", 0),
     # the names of connections are labels
-    "run two_oscillators.toml -o two.nc": (f"{ASKED} fmpy", 0),
-    "sensitivity drawn.nc": (ASKED, 0),
-    "hard-cases --only grazing-from-below": (ASKED, 0),
-    "import signal.csv --rate 100 --unit m -o signal.nc": (ASKED, 0),
-    "estimate decay signal.nc": (ASKED, 0),
-    "estimate impacts run.nc --angular-frequency 0.9 --channel displacement": (ASKED, 0),
-    "estimate bounces signal.nc": (ASKED, 1),
-    "estimate response signal.nc --drive absent": (ASKED, 2),
-    "spikes signal.nc": (ASKED, 0),
-    "fmu replay signal.nc -o signal.fmu": (ASKED, 0),
-    "lyapunov swept.nc": (ASKED, 0),
-    "energies swept.nc": (ASKED, 0),
-    "resonances swept.nc": (ASKED, 2),
-    "basins scene.toml --points 5": (ASKED, 0),
-    "transients scene.toml --starts 1": (ASKED, 0),
+    "run two_oscillators.toml -o two.nc": (f"{RECOGNIZED} fmpy", 0),
+    "sensitivity drawn.nc": (RECOGNIZED, 0),
+    "hard-cases --only grazing-from-below": (RECOGNIZED, 0),
+    "import signal.csv --rate 100 --unit m -o signal.nc": (RECOGNIZED, 0),
+    "estimate decay signal.nc": (RECOGNIZED, 0),
+    "estimate impacts run.nc --angular-frequency 0.9 --channel displacement": (RECOGNIZED, 0),
+    "estimate bounces signal.nc": (RECOGNIZED, 1),
+    "estimate response signal.nc --drive absent": (RECOGNIZED, 2),
+    "spikes signal.nc": (RECOGNIZED, 0),
+    "fmu replay signal.nc -o signal.fmu": (RECOGNIZED, 0),
+    "lyapunov swept.nc": (RECOGNIZED, 0),
+    "energies swept.nc": (RECOGNIZED, 0),
+    "resonances swept.nc": (RECOGNIZED, 2),
+    "basins scene.toml --points 5": (RECOGNIZED, 0),
+    "transients scene.toml --starts 1": (RECOGNIZED, 0),
     # xarray looks for a scheduler of Dask when it writes
-    "maps --kind square-root --points 20 --from 0.1 --to 0.2 -o map.nc": (f"{ASKED} distributed", 0),
+    "maps --kind square-root --points 20 --from 0.1 --to 0.2 -o map.nc": (f"{RECOGNIZED} distributed", 0),
     "plot swept.nc -o swept.png": ("dask matplotlib", 0),
     "campaign swept.toml -o few": ("", 0),
     # no worker answers there: only the client's own needs are loaded
@@ -131,7 +131,7 @@ OTHERS: Rows = {
     ),
     "rig recover absent.journal": ("grpc nidaqmx", 2),
     "rig sine --output Dev1/ao0 --frequency 5 --amplitude 99": ("grpc nidaqmx", 2),
-    "rig sweep sweep.toml -o rig_sweep --dry-run": (f"{ASKED} grpc matplotlib nidaqmx", 0),
+    "rig sweep sweep.toml -o rig_sweep --dry-run": (f"{RECOGNIZED} grpc matplotlib nidaqmx", 0),
     "serve --data served --host 192.0.2.1": ("dask distributed fastapi fmpy matplotlib uvicorn", 2),
 }
 """All other commands, with the packages of `HEAVY` that they may load, and their exit code."""

@@ -126,7 +126,7 @@ class Modal:
         """Return time, speed and end of each contact that has ended, and the state at the end."""
         modes = len(self.shape)
         rigid = isinstance(self.stop, RestitutionStop)
-        position, touching, begun = self.stop.position, False, (0.0, 0.0)
+        position, touching, contact_start = self.stop.position, False, (0.0, 0.0)
 
         def rates(t: float, y: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
             q, p = y[:modes], y[modes:]
@@ -155,12 +155,12 @@ class Modal:
                 return touches, y
             if touching:
                 touching = False
-                touches.append((*begun, t))
+                touches.append((*contact_start, t))
                 continue
             speed = float(self.shape @ y[modes:])
-            begun = (t, speed)
+            contact_start = (t, speed)
             if rigid:
-                touches.append((*begun, t))
+                touches.append((*contact_start, t))
                 restitution = self.stop.restitution  # type: ignore[union-attr]
                 y[modes:] -= (1.0 + restitution) * speed * self.shape / (self.shape @ self.shape)
             touching = not rigid

@@ -34,7 +34,7 @@ from support.borders import borders_found  # noqa: E402
 
 FIGURE = ROOT / "examples" / "thesis" / "figure_3_3.toml"
 KEY, GAP = "forcing.angular_frequency", "stop[1].position"
-BEGUN_WITH = (51, 401)
+FIRST_VALUES = (51, 401)
 """Values each way in the first round of the adaptive sweeps."""
 NEAR = 1e-4
 """Distance below which a bracket matches a jump of the uniform sweep: points of a path depend on its steps."""
@@ -58,7 +58,7 @@ def measure_figure(folder: Path, output: Path, step: float) -> None:
     uniform = jumps_of(whole)
     print(f"figure 3.3, uniform: {points} points in {seconds:.0f} s, {uniform.sizes['jump']} jumps")
     nearest = {}
-    for count in BEGUN_WITH:
+    for count in FIRST_VALUES:
         adaptive = {KEY: axis | {"points": count, "adaptive": {"tolerance": step, "at_most": 5000}}}
         dataset, fewer, seconds = timed(folder / str(count), adaptive, {})
         found = jumps_of(dataset)

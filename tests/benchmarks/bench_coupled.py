@@ -126,7 +126,7 @@ class FmpyCoupled:
         self.body.enterStepMode()
         self.outputs = [names["contact[1].displacement"], names["contact[1].velocity"]]
         self.inputs = [names["contact[1].applied_restitution"], names["contact[1].applied_force"]]
-        self.asked = [stop_names["displacement"], stop_names["velocity"]]
+        self.stop_inputs = [stop_names["displacement"], stop_names["velocity"]]
         self.answers = [stop_names["applied_restitution"], stop_names["applied_force"]]
         self.time = 0.0
 
@@ -138,7 +138,7 @@ class FmpyCoupled:
             event, _, _, reached = body.doStep(
                 currentCommunicationPoint=self.time, communicationStepSize=end - self.time
             )
-            stop.setFloat64(self.asked, body.getFloat64(self.outputs))
+            stop.setFloat64(self.stop_inputs, body.getFloat64(self.outputs))
             stop.doStep(currentCommunicationPoint=self.time, communicationStepSize=reached - self.time)
             self.time = reached
             if event:

@@ -194,8 +194,8 @@ def machine(*others: str) -> dict[str, str]:
         model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), model)
     compiler = os.environ.get("CC", "cc")
     try:
-        told = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
-        compiler = told.splitlines()[0]
+        output = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
+        compiler = output.splitlines()[0]
     except (OSError, subprocess.CalledProcessError):
         compiler = "unknown"
     packages = {name: version(name) for name in ("numpy", "scipy", *others)}

@@ -159,7 +159,7 @@ def timed(
     return found
 
 
-def told(times: list[float]) -> str:
+def summary(times: list[float]) -> str:
     """Return the median and the range of times."""
     return f"{statistics.median(times):.4g} s ({min(times):.3g} to {max(times):.3g})"
 
@@ -188,7 +188,7 @@ def main() -> None:
         time.process_time,
     )
     for name, seconds in times.items():
-        print(f"{name}: {told(seconds)}")
+        print(f"{name}: {summary(seconds)}")
     print(f"  speeds differ by {abs(orbit_by_phases() - orbit_by_shooting()):.1e}")
     began = time.process_time()
     where, runs = doubling_by_sweeps(1e-8)
@@ -206,7 +206,7 @@ def main() -> None:
         time.perf_counter,
     )
     for name, seconds in walls.items():
-        print(f"{name}: {told(seconds)}")
+        print(f"{name}: {summary(seconds)}")
     single = statistics.median(walls["400 single runs, classified"]) / 400.0
     own = statistics.median(walls["basins of 10,000 starts"]) / 10_000.0
     print(

@@ -112,25 +112,25 @@ def in_real_time(address: str, server: psutil.Process, seconds: float) -> RealTi
             drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
             drive.timing.cfg_samp_clk_timing(RATE, sample_mode=constants.AcquisitionType.CONTINUOUS)
             drive.write(3.0 * np.sin(2.0 * np.pi * np.arange(10_000) / 10_000))
-            heard: queue.SimpleQueue[float] = queue.SimpleQueue()
+            received: queue.SimpleQueue[float] = queue.SimpleQueue()
 
-            def hear(*_: object) -> int:
-                heard.put(time.monotonic())
+            def receive(*_: object) -> int:
+                received.put(time.monotonic())
                 return 0
 
-            task.register_every_n_samples_acquired_into_buffer_event(EVERY, hear)
+            task.register_every_n_samples_acquired_into_buffer_event(EVERY, receive)
             reader = stream_readers.AnalogMultiChannelReader(task.in_stream)
             reader.verify_array_shape = False
             data = np.zeros((CHANNELS, EVERY))
             drive.start()
             task.start()
-            heard.get(timeout=10.0)  # the first calls make the connection
+            received.get(timeout=10.0)  # the first calls make the connection
             reader.read_many_sample(data, EVERY)
             events, reads = [], []
             before = processor_time(me), processor_time(server)
             began = time.monotonic()
             for _ in range(round(seconds * RATE / EVERY)):
-                events.append(heard.get(timeout=10.0))
+                events.append(received.get(timeout=10.0))
                 reader.read_many_sample(data, EVERY)
                 reads.append(time.monotonic())
             passed = time.monotonic() - began

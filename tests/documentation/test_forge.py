@@ -38,13 +38,13 @@ def test_the_workflow_calls_targets_of_the_makefile_and_extras_that_are_there() 
 
 def test_the_workflow_asks_for_pythons_that_the_package_allows_the_oldest_among_them() -> None:
     jobs = read(WORKFLOW)["jobs"]
-    asked = {step["with"]["python-version"] for step in steps() if "python-version" in step.get("with", {})}
-    asked |= set(jobs["linux"]["strategy"]["matrix"]["python"])
-    asked |= {one["python"] for one in jobs["untried"]["strategy"]["matrix"]["include"]}
-    versions = {tuple(map(int, version.split("."))) for version in asked if "{" not in version}
+    stated = {step["with"]["python-version"] for step in steps() if "python-version" in step.get("with", {})}
+    stated |= set(jobs["linux"]["strategy"]["matrix"]["python"])
+    stated |= {one["python"] for one in jobs["untried"]["strategy"]["matrix"]["include"]}
+    versions = {tuple(map(int, version.split("."))) for version in stated if "{" not in version}
     assert min(versions) == (3, 11)
     assert PROJECT["requires-python"] == ">=3.11"
-    assert {f"3.{minor}" for minor in range(11, 15)} <= asked
+    assert {f"3.{minor}" for minor in range(11, 15)} <= stated
     assert jobs["untried"]["continue-on-error"] is True
 
 
@@ -68,12 +68,12 @@ def test_the_workflow_may_read_only() -> None:
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
 def test_an_issue_form_asks_questions_each_with_a_name_of_its_own(form: Path) -> None:
-    asked = read(form)
-    assert asked["name"]
-    assert asked["description"]
-    ids = [question["id"] for question in asked["body"]]
+    content = read(form)
+    assert content["name"]
+    assert content["description"]
+    ids = [question["id"] for question in content["body"]]
     assert len(set(ids)) == len(ids) > 2
-    assert all(question["attributes"]["label"] for question in asked["body"])
+    assert all(question["attributes"]["label"] for question in content["body"])
 
 
 @pytest.mark.parametrize("name", ["bug", "wrong_number"])

@@ -99,10 +99,10 @@ def test_a_uniform_sweep_through_a_bracket_jumps_inside_it(figure: xr.Dataset, t
     (up,) = np.flatnonzero((jumps.direction == "up") & (jumps.below > 1.4))
     low, high = float(jumps.below[up]), float(jumps.above[up])
     values = {"start": low - 10 * TOLERANCE, "stop": high + 10 * TOLERANCE, "points": 22, "path": "up"}
-    begun = np.linspace(1.2, values["start"], 40)[:-1].tolist()
+    coarse = np.linspace(1.2, values["start"], 40)[:-1].tolist()
     fine = np.linspace(values["start"], values["stop"], 22).tolist()
     (found,) = jumps_of(
-        swept(tmp_path, {KEY: {"values": [*begun, *fine], "path": "up"}}), jump=0.2
+        swept(tmp_path, {KEY: {"values": [*coarse, *fine], "path": "up"}}), jump=0.2
     ).above.values
     assert low - TOLERANCE <= found <= high + TOLERANCE
 

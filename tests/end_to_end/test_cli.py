@@ -54,11 +54,11 @@ def small_sweep(path: str) -> str:
     return text.replace("transient_periods = 1000", "transient_periods = 100")
 
 
-def assert_misuse(done: subprocess.CompletedProcess[str], *told: str) -> None:
+def assert_misuse(done: subprocess.CompletedProcess[str], *expected: str) -> None:
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert not done.stdout
-    for words in told:
+    for words in expected:
         assert words in done.stderr
 
 
@@ -221,8 +221,8 @@ def test_the_demo_reads_the_known_landmarks_within_two_steps(tmp_path: Path) -> 
     assert time.monotonic() - began < 60.0
     assert read_flat(tmp_path / "demo" / "dataset.nc").sizes["run"] == 802
     assert (tmp_path / "demo" / "bifurcation.png").stat().st_size > 10_000
-    for told in ("lower graze", "upper graze", "fold", "doubling", "0.936493", "1.516611", "dataset.nc"):
-        assert told in done.stdout
+    for expected in ("lower graze", "upper graze", "fold", "doubling", "0.936493", "1.516611", "dataset.nc"):
+        assert expected in done.stdout
     again = in_this_process("demo", "-o", tmp_path / "demo")
     assert again.returncode == 0
     assert "were there already" in again.stdout
@@ -278,7 +278,7 @@ def that_escapes(name: str, data: bytes) -> tuple[str, bytes]:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "expected"),
     [
         (for_another_machine, "riscv64-plan9"),
         (with_entities, "document type declaration"),
@@ -288,7 +288,7 @@ def that_escapes(name: str, data: bytes) -> tuple[str, bytes]:
 )
 @pytest.mark.parametrize("command", ["run", "campaign"])
 def test_a_bad_fmu_file_is_misuse_with_one_message(
-    command: str, change: Callable[[str, bytes], tuple[str, bytes]] | None, told: str, tmp_path: Path
+    command: str, change: Callable[[str, bytes], tuple[str, bytes]] | None, expected: str, tmp_path: Path
 ) -> None:
     fmu = tmp_path / "bad.fmu"
     if change is None:
@@ -303,7 +303,7 @@ def test_a_bad_fmu_file_is_misuse_with_one_message(
     output = "x.nc" if command == "run" else "folder"
     # the workers of a campaign need a process of their own as parent, as in a terminal
     start = in_this_process if command == "run" else vibroimpact
-    assert_misuse(start(command, scene, "-o", tmp_path / output), told)
+    assert_misuse(start(command, scene, "-o", tmp_path / output), expected)
     assert not (tmp_path / "x.nc").exists()
 
 

@@ -75,8 +75,8 @@ def commands_take(folder: Path, remark: str, *, by_loading: bool = False) -> Non
     scene.write_text(GAIN_SCENE)
     done = in_this_process("run", scene, "-o", folder / "r.nc", "--strict")
     assert done.returncode == 0, done.stderr
-    told = "note: g.fmu: 1 remark on its description" in done.stderr
-    assert told == bool(remark and not by_loading)
+    has_note = "note: g.fmu: 1 remark on its description" in done.stderr
+    assert has_note == bool(remark and not by_loading)
     assert read_flat(folder / "r.nc").g_y.values.tolist() == pytest.approx([6.0] * 11)
     assert in_this_process("check", scene, "--strict").returncode == 0
     checked = in_this_process("fmu", "check", fmu, "--strict")

@@ -137,17 +137,17 @@ def test_a_component_that_cannot_be_reset_is_instantiated_anew(
 
 @pytest.mark.parametrize(
     # a process that stops itself can no longer name its current call
-    ("fault", "told"),
+    ("fault", "named"),
     [("hang", "culprit: fmi3Reset"), ("stop_process", "no answer within")],
 )
 def test_a_reset_that_does_not_come_back_is_left_behind_with_its_process(
-    runner_of: Callable[..., Runner], fault: str, told: str
+    runner_of: Callable[..., Runner], fault: str, named: str
 ) -> None:
     runner = runner_of(fault, "reset", deadline=0.3)
     for k in range(1, 4):
         record = runner.run({"culprit.u": float(k)})
         assert record.outcome is Outcome.ok
-        assert (told in record.message) == (k > 1)
+        assert (named in record.message) == (k > 1)
 
 
 def test_a_point_that_crashes_in_a_fresh_process_too_is_lost(runner_of: Callable[..., Runner]) -> None:

@@ -130,8 +130,8 @@ def test_the_slowest_studies_hear_ctrl_c(
     output = tmp_path / "half.nc"
     command = [sys.executable, "-c", ENTRY, name, *given, "-o", str(output)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        told = getattr(process, stream)
-        while not all(told.readline() for _ in range(2)):
+        lines = getattr(process, stream)
+        while not all(lines.readline() for _ in range(2)):
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=120)

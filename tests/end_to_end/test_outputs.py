@@ -33,10 +33,10 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-def misuse(done: subprocess.CompletedProcess[str], told: str) -> None:
+def misuse(done: subprocess.CompletedProcess[str], expected: str) -> None:
     assert done.returncode == 2, done.stderr
     assert len(done.stderr.splitlines()) == 1
-    assert told in done.stderr
+    assert expected in done.stderr
 
 
 @pytest.mark.parametrize("name", ["x.csv", "x", "x.png", "x.NC", "x.nc.txt", ".nc"])
@@ -222,11 +222,11 @@ def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
     scene.write_text(text + more)
     # /proc counts the memory of this program alone; getrusage includes that of the parent process
     status = "pathlib.Path('/proc/self/status').read_text()"
-    told_at_the_end = f"import atexit, pathlib; atexit.register(lambda: print({status}))"
+    prints_status = f"import atexit, pathlib; atexit.register(lambda: print({status}))"
     command = [
         sys.executable,
         "-c",
-        f"{told_at_the_end}\n{ENTRY}",
+        f"{prints_status}\n{ENTRY}",
         "run",
         str(scene),
         "-o",
@@ -256,8 +256,8 @@ def test_a_command_whose_reader_has_gone_writes_what_it_computed(
         assert process.stdout is not None
         process.stdout.close()
         assert process.stderr is not None
-        told = process.stderr.read()
-    assert (process.returncode, told) == (0, "")
+        errors = process.stderr.read()
+    assert (process.returncode, errors) == (0, "")
     with xr.open_dataset(output) as dataset:
         assert dataset.sizes
 

@@ -90,7 +90,7 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (("one.nc",), "--output: expected a dataset"),
         (("-o", "x.nc"), "expected a recording to replay, got none"),
@@ -104,12 +104,12 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(
     ],
 )
 def test_misuse_is_one_line_exit_code_2_and_no_file(
-    folder: Path, arguments: tuple[str, ...], told: str
+    folder: Path, arguments: tuple[str, ...], expected: str
 ) -> None:
     given = [folder / text if text.endswith(".nc") else text for text in arguments]
     done = in_this_process("replay", folder / "board.toml", *given)
     assert done.returncode == 2
-    assert told in done.stderr
+    assert expected in done.stderr
     assert "Traceback" not in done.stderr
     assert not (folder / "x.nc").exists()
 

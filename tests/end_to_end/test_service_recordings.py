@@ -148,8 +148,8 @@ def test_a_recording_whose_file_somebody_has_removed_is_named_and_can_be_deleted
         found = service.upload_recording(hit(tmp_path, seed=3), name="removed.nc")
     (served.folder / "recordings" / f"{found.id}.nc").unlink()
     decay = {"recording": found.name, "estimate": {"kind": "decay"}}
-    asked = [raw.get(f"/recordings/removed.nc/{what}") for what in ("file", "figure")]
-    for answer in (*asked, raw.post("/estimates", json=decay)):
+    answers = [raw.get(f"/recordings/removed.nc/{what}") for what in ("file", "figure")]
+    for answer in (*answers, raw.post("/estimates", json=decay)):
         assert (answer.status_code, "somebody has removed it" in answer.text) == (409, True)
         assert str(served.folder) not in answer.text
     replayed = raw.post("/campaigns", json={"scene": BOARD, "recordings": ["removed.nc"]})

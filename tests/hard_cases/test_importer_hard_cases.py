@@ -162,14 +162,14 @@ def test_a_stop_is_asked_about_the_contact_and_not_about_the_step_before(
         exchange=exchange,  # type: ignore[arg-type]
     )
     log = ImpactLog(importer, "b")
-    asked: list[float] = []
-    importer.on_event = lambda event: asked.append(values(importer, "s", "velocity")[0])
+    stop_velocities: list[float] = []
+    importer.on_event = lambda event: stop_velocities.append(values(importer, "s", "velocity")[0])
     importer.begin()
     importer.advance(60.0)
     if versions[0] == "2.0":
         # its own event ends the step, so the stop has stepped to it; a body of FMI 3.0 asks later, in event mode
-        assert asked == [impact.velocity for impact in log.take()]
-    assert len(log.take()) == len(asked) == 9
+        assert stop_velocities == [impact.velocity for impact in log.take()]
+    assert len(log.take()) == len(stop_velocities) == 9
     assert (
         largest_difference(log.take(), impacts([BODIES[0]], ["3.0"], math.inf, "gauss_seidel", 60.0)[0][0])
         <= SEQUENCE

@@ -38,14 +38,14 @@ class Shares:
         }
         self._groups, self._whole = groups, whole
         self._waiting = deque(sorted(numbers.values(), key=self._left, reverse=True))
-        self._begun: list[deque[int]] = [deque() for _ in range(workers)]
+        self._started: list[deque[int]] = [deque() for _ in range(workers)]
 
     def _left(self, group: deque[int]) -> float:
         return sum(self._each[number] for number in group)
 
     def next(self, worker: int) -> int | None:
         """Return the next test of a worker; None if no test is left for it."""
-        own = self._begun[worker]
+        own = self._started[worker]
         if not own and self._waiting:
             own.extend(self._waiting.popleft())
         if not own:
@@ -53,11 +53,11 @@ class Shares:
         return own.popleft() if own else None
 
     def _take_over(self, own: deque[int]) -> None:
-        shared = [group for group in self._begun if group and self._groups[group[0]] not in self._whole]
+        shared = [group for group in self._started if group and self._groups[group[0]] not in self._whole]
         busiest = max(shared, key=lambda group: (self._left(group), len(group)), default=own)
         for _ in range((len(busiest) + 1) // 2):
             own.appendleft(busiest.pop())
 
     def give_back(self, worker: int, number: int) -> None:
         """Take back a test that a worker has not started."""
-        self._begun[worker].appendleft(number)
+        self._started[worker].appendleft(number)

@@ -16,7 +16,7 @@ import pytest
 from _pytest._io import TerminalWriter
 
 
-class _Told:
+class _Reporter:
     """The plugin that passes on the terminal's events."""
 
     def __init__(self, config: pytest.Config, link: Connection) -> None:
@@ -44,9 +44,9 @@ class _Told:
         if not self.listens:
             return
         # the warning's own class may not be serializable
-        told = f"{warning_message.category.__name__}: {warning_message.message}"
+        text = f"{warning_message.category.__name__}: {warning_message.message}"
         plain = warnings.WarningMessage(
-            Warning(told), Warning, warning_message.filename, warning_message.lineno
+            Warning(text), Warning, warning_message.filename, warning_message.lineno
         )
         given = {"warning_message": plain, "when": when, "nodeid": nodeid, "location": location}
         self._link.send(("warning", given))
@@ -87,9 +87,9 @@ def _become_a_worker(config: pytest.Config, link: Connection, folder: Path) -> N
     plugins: Any = config.pluginmanager
     plugins.unregister(name="terminalreporter")
     plugins.register(_NoTerminal(), "terminalreporter")
-    told = _Told(config, link)
-    plugins.register(told)
-    told.listens = True
+    reporter = _Reporter(config, link)
+    plugins.register(reporter)
+    reporter.listens = True
     capture = plugins.getplugin("capturemanager")
     # all copies share the files of captured output
     capture.stop_global_capturing()

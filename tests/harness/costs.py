@@ -19,7 +19,7 @@ import pytest
 from harness import kept_costs, warm
 
 KEPT = Path(__file__).with_name("budget.toml")
-DEAREST = 20
+LISTED = 20
 MAY_GROW = 0.1
 """Share of the stored figure by which processor time may grow."""
 SHARED = "shared fixtures: services, clusters, folders"
@@ -145,9 +145,9 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     if TOTAL not in config.stash:
         return
     costs, (seconds, yardsticks) = config.stash[COSTS], config.stash[TOTAL]
-    terminalreporter.section(f"processor time: the {DEAREST} dearest tests")
+    terminalreporter.section(f"processor time: the {LISTED} dearest tests")
     for name, took in sorted((costs.tests | {SHARED: costs.shared}).items(), key=lambda item: -item[1])[
-        :DEAREST
+        :LISTED
     ]:
         terminalreporter.line(f"{took:7.1f} s  {name}")
     each = statistics.mean(costs.yardsticks)

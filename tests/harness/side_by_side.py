@@ -53,21 +53,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    if _is_wanted(session.config):
+    if _is_active(session.config):
         # its objects are no garbage, and this process does little else
         gc.disable()
         if not session.config.option.cold:
             warm.start_server()
 
 
-def _is_wanted(config: pytest.Config) -> bool:
+def _is_active(config: pytest.Config) -> bool:
     option = config.option
     return FORKS and option.side_by_side > 0 and not (option.collectonly or option.usepdb)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    if not _is_wanted(session.config) or not session.items or session.testsfailed:
+    if not _is_active(session.config) or not session.items or session.testsfailed:
         return None
     warm.refuse_threads()
     warm.wait_for_server()
@@ -199,8 +199,8 @@ class _Workers:
             self._shares.give_back(worker, following)
             self._start(worker)
 
-    def _fail(self, item: pytest.Item, told: str) -> None:
-        words = f"{item.nodeid}: the worker that ran it {told}."
+    def _fail(self, item: pytest.Item, end: str) -> None:
+        words = f"{item.nodeid}: the worker that ran it {end}."
         hook = self._session.config.hook
         where = {"nodeid": item.nodeid, "location": item.location}
         report = pytest.TestReport(

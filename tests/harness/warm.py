@@ -165,7 +165,7 @@ class Copy:
         self.returncode: int | None = None
         self._waiting = threading.Lock()
         self.args = arguments
-        asked = {
+        request = {
             "program": program,
             "arguments": arguments,
             "folder": os.fspath(cwd or Path.cwd()),
@@ -177,7 +177,7 @@ class Copy:
             (self.stdin, given), (self.stdout, out), (self.stderr, err) = ends
             self._connection = socket.socket(socket.AF_UNIX)
             self._connection.connect(str(Path(_server[1].name, "socket")))
-            data = json.dumps(asked).encode() + b"\n"
+            data = json.dumps(request).encode() + b"\n"
             sent = socket.send_fds(self._connection, [data], [given, out, err])
             # a copy may have ended by now: sending nothing to it is an error
             if sent < len(data):
@@ -211,21 +211,21 @@ class Copy:
                     raise subprocess.TimeoutExpired(self.args, timeout or 0.0) from None
                 assert ready, ENDED
                 self._connection.settimeout(None)
-                told = json.loads(self._line())
+                answer = json.loads(self._line())
                 self._connection.close()
-                self.returncode = int(told["code"])
+                self.returncode = int(answer["code"])
                 with _lock:
-                    _seconds += told["seconds"]
+                    _seconds += answer["seconds"]
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
         """Return the whole output and error output, after the end."""
         deadline = None if timeout is None else time.monotonic() + timeout
         streams = [stream for stream in (self.stdout, self.stderr) if stream and not stream.closed]
-        told: dict[IO[str] | None, str] = {None: "", **dict.fromkeys(streams, "")}
+        outputs: dict[IO[str] | None, str] = {None: "", **dict.fromkeys(streams, "")}
 
         def read(stream: IO[str]) -> None:
-            told[stream] = stream.read()
+            outputs[stream] = stream.read()
 
         readers = [threading.Thread(target=read, args=[stream], daemon=True) for stream in streams]
         for reader in readers:
@@ -237,7 +237,7 @@ class Copy:
         self.wait(None if deadline is None else max(0.001, deadline - time.monotonic()))
         for stream in streams:
             stream.close()
-        return told.get(self.stdout, ""), told.get(self.stderr, "")
+        return outputs.get(self.stdout, ""), outputs.get(self.stderr, "")
 
     def send_signal(self, number: int) -> None:
         """Send a signal, unless the program has ended, even if its end was not noticed before."""
@@ -266,20 +266,20 @@ class Copy:
 
 
 def _ends(
-    number: int, asked: int | IO[Any] | None, stack: contextlib.ExitStack
+    number: int, stream: int | IO[Any] | None, stack: contextlib.ExitStack
 ) -> tuple[IO[str] | None, int]:
     """Return the own end of a standard stream, if it is a pipe, and the file descriptor of the other end."""
     mode = "r" if number else "w"
-    if asked == subprocess.PIPE:
+    if stream == subprocess.PIPE:
         pipe = os.pipe()
         mine, theirs = pipe if number else reversed(pipe)
         stack.callback(os.close, theirs)
         return open(mine, mode), theirs
-    if asked == subprocess.DEVNULL:
+    if stream == subprocess.DEVNULL:
         return None, stack.enter_context(open(os.devnull, "r+")).fileno()
-    if asked is None:
+    if stream is None:
         return None, number
-    return None, asked if isinstance(asked, int) else asked.fileno()
+    return None, stream if isinstance(stream, int) else stream.fileno()
 
 
 Program: TypeAlias = subprocess.Popen[str] | Copy

@@ -107,15 +107,15 @@ class _Server:
             return None
         while not data.endswith(b"\n"):
             data += connection.recv(MOST_BYTES)
-        asked = json.loads(data)
+        request = json.loads(data)
         has_become, says_so = os.pipe()
         pid = os.fork()
         if not pid:
             self._leave(connection)
             os.close(has_become)
-            become(asked, streams)
+            become(request, streams)
             os.close(says_so)
-            return str(asked["program"])
+            return str(request["program"])
         for stream in (says_so, *streams):
             os.close(stream)
         # only now can the copy be killed by its process group
@@ -141,19 +141,19 @@ class _Server:
                 return
             if pid in self._connections:
                 with self._connections.pop(pid) as connection:
-                    told = {
+                    answer = {
                         "code": os.waitstatus_to_exitcode(status),
                         "seconds": used.ru_utime + used.ru_stime,
                     }
                     try:
-                        connection.sendall(json.dumps(told).encode() + b"\n")
+                        connection.sendall(json.dumps(answer).encode() + b"\n")
                     except BrokenPipeError:
                         continue  # nobody waits for it any more
 
 
-def become(asked: dict[str, Any], streams: list[int]) -> None:
+def become(request: dict[str, Any], streams: list[int]) -> None:
     """Turn this copy into the requested Python, as if just started."""
-    if asked["session"]:
+    if request["session"]:
         os.setsid()
     else:
         os.setpgid(0, 0)
@@ -161,10 +161,10 @@ def become(asked: dict[str, Any], streams: list[int]) -> None:
         os.dup2(stream, number)
         os.close(stream)
     os.environ.clear()
-    os.environ.update(asked["environment"])
-    os.chdir(asked["folder"])
+    os.environ.update(request["environment"])
+    os.chdir(request["folder"])
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.argv = ["-c", *asked["arguments"]]
+    sys.argv = ["-c", *request["arguments"]]
     more = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     sys.path[:0] = [folder for folder in more if folder not in sys.path]
     for stream in (sys.stdout, sys.stderr):

@@ -14,8 +14,8 @@ from rich.console import Console
 from soak._journal import state_of_the_code
 from support.places import ROOT
 
-from interval_coverage._asked import asked
-from interval_coverage._table import Line, again, shares, table_of, thin
+from interval_coverage._asked import journal_line
+from interval_coverage._table import Line, again, shares, table_of, thin_cells
 
 SEED, RECORDS = 7, 480
 DRAWS = 7
@@ -36,7 +36,7 @@ def main() -> int:
 
         def ask(places: Iterable[Place]) -> None:
             waiting = [place for place in places if place not in lines]
-            for line in pool.imap_unordered(partial(asked, seed=seed), waiting):
+            for line in pool.imap_unordered(partial(journal_line, seed=seed), waiting):
                 print(json.dumps(line), file=journal, flush=True)
                 lines[line["case"], line["draw"]] = line
                 if len(lines) % 10 == 0:
@@ -44,7 +44,7 @@ def main() -> int:
 
         ask((case, 0) for case in range(count))
         cases = sorted(
-            {case for found in thin(lines.values()).values() for case in found if count >= RECORDS}
+            {case for found in thin_cells(lines.values()).values() for case in found if count >= RECORDS}
         )
         ask((case, draw) for case in cases for draw in range(1, DRAWS + 1))
     first = [line for line in lines.values() if not line["draw"]]

@@ -29,7 +29,7 @@ def estimates_of(one: Record, methods: Sequence[str] = METHODS) -> ImpactEstimat
     return estimate_impacts(channel, Forcing(one.truth["angular_frequency"]), known, methods=methods)
 
 
-def asked(place: tuple[int, int], seed: int) -> dict[str, Any]:
+def journal_line(place: tuple[int, int], seed: int) -> dict[str, Any]:
     """Return the line of the journal for a case and a draw of its noise.
 
     `sure` holds, for each method without reasons for doubt, [value, standard error, low, high, truth] by quantity.

@@ -56,9 +56,9 @@ def shares(lines: Sequence[Line]) -> list[Share]:
     good = [line for line in clean if line["noise"] <= GOOD_NOISE and line["flight_samples"] >= GOOD_FLIGHT]
     found = [*_held(clean), *_by_region(clean)]
     for method in METHODS:
-        asked = _can_answer(method)
+        is_answerable = _can_answer(method)
         for words, some, target in (("clean", clean, ANSWERED), ("good", good, ANSWERED_GOOD)):
-            able = [line for line in some if asked(line)]
+            able = [line for line in some if is_answerable(line)]
             hits = sum(method in line["sure"] for line in able)
             found.append(Share(f"{method}: answers that are sure, {words} records", hits, len(able), target))
     flagged = sum(not line["sure"] for line in spoiled)
@@ -101,7 +101,7 @@ def _by_region(clean: Sequence[Line]) -> Iterable[Share]:
         yield Share(f"{region}: records of which something is sure", sure, len(lines), SOMETHING_SURE)
 
 
-def thin(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
+def thin_cells(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
     """Return the cells with few intervals, by method and quantity, with the cases of these intervals."""
     cases: dict[tuple[str, str], list[int]] = {}
     for line in lines:
@@ -116,9 +116,9 @@ def thin(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
 def again(lines: Sequence[Line], draws: int) -> list[Share]:
     """Return the shares of the thin cells with further noises for each of their records."""
     found = []
-    for (method, name), cases in thin(lines).items():
-        asked = [line["sure"].get(method, {}).get(name) for line in lines if line["case"] in cases]
-        held = [low <= truth <= high for _, _, low, high, truth in filter(None, asked)]
+    for (method, name), cases in thin_cells(lines).items():
+        intervals = [line["sure"].get(method, {}).get(name) for line in lines if line["case"] in cases]
+        held = [low <= truth <= high for _, _, low, high, truth in filter(None, intervals)]
         found.append(Share(f"{method}: {name}, {draws + 1} noises of each", sum(held), len(held), *HELD))
     return found
 

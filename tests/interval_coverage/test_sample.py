@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from interval_coverage._asked import asked
+from interval_coverage._asked import journal_line
 from interval_coverage._records import KNOWN, REGIONS, SPOILS, record
-from interval_coverage._table import FEWEST, HELD, HELD_IN_REGION, Share, shares, thin
+from interval_coverage._table import FEWEST, HELD, HELD_IN_REGION, Share, shares, thin_cells
 
 SEED = 1
 PLAIN = (0, 2, 14, 16, 20, 24, 30, 34)
@@ -18,7 +18,7 @@ SPOILED = {11: "second mode", 35: "dry friction", 95: "speed-dependent restituti
 
 @cache
 def line(case):
-    return asked((case, 0), SEED)
+    return journal_line((case, 0), SEED)
 
 
 @pytest.mark.parametrize("case", SPOILED)
@@ -97,8 +97,8 @@ def test_a_share_misses_its_target_only_beyond_chance(hits, missed):
 def test_cells_of_few_intervals_are_asked_again_and_told_apart():
     sure = {"weak_form": {"phase": [0.0, 1.0, -1.0, 1.0, 0.5]}}
     many = [{"case": case, "draw": 0, "spoil": "", "sure": sure} for case in range(FEWEST)]
-    assert thin(many) == {}
-    assert thin(many[1:]) == {("weak_form", "phase"): list(range(1, FEWEST))}
+    assert thin_cells(many) == {}
+    assert thin_cells(many[1:]) == {("weak_form", "phase"): list(range(1, FEWEST))}
 
 
 def test_intervals_that_hold_too_often_miss_their_target_too():

@@ -59,8 +59,8 @@ class Library:
         one = self.component
         if one is None:
             return tuple(core)
-        beside = sorted(path for folder in beside_core(one, NATIVE) for path in folder.rglob("*.c"))
-        return (*(path for path in core if is_part(one, path.relative_to(NATIVE / "core"))), *beside)
+        others = sorted(path for folder in beside_core(one, NATIVE) for path in folder.rglob("*.c"))
+        return (*(path for path in core if is_part(one, path.relative_to(NATIVE / "core"))), *others)
 
     @cached_property
     def name(self) -> str:

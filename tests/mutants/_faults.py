@@ -61,8 +61,8 @@ class Fault:
 def places() -> tuple[Fault, ...]:
     """Return all possible faults of the kinds above, in the order of the C files."""
     files = [path for room in ROOMS for path in sorted((NATIVE / room).rglob("*"))]
-    wanted = [path for path in files if path.suffix == ".c" or path.name in HEADERS]
-    return tuple(fault for path in wanted for fault in _faults_of(path))
+    computing = [path for path in files if path.suffix == ".c" or path.name in HEADERS]
+    return tuple(fault for path in computing for fault in _faults_of(path))
 
 
 def drawn(seed: int) -> Iterator[Fault]:

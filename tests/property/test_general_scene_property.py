@@ -112,6 +112,6 @@ def test_any_two_variables_are_connected_or_told_why_not(data: st.DataObject) ->
     document["connection"] = [{"from": f"b.{source}", "to": f"a.{target}"}]
     problems = found_in(document)
     # a connection to a contact of the watched component is reported at the watch
-    told = ("s.toml: connection[1]", "s.toml: event[1].watch: expected a component without a contact")
-    assert all(problem.startswith(told) for problem in problems), problems
+    expected = ("s.toml: connection[1]", "s.toml: event[1].watch: expected a component without a contact")
+    assert all(problem.startswith(expected) for problem in problems), problems
     assert len(problems) <= 2

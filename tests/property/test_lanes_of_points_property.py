@@ -65,14 +65,16 @@ def assert_agree(lanes: xr.Dataset, fused: xr.Dataset) -> None:
     short = few_impacts(fused)
     for name in ("final_displacement", "final_velocity", "displacement_max", "strobe_velocity"):
         if name in lanes:
-            values, wanted = (rows[name].values[short] for rows in (lanes, fused))
-            assert values == pytest.approx(wanted, rel=AGREEMENT, abs=AGREEMENT, nan_ok=True)
+            values, expected = (rows[name].values[short] for rows in (lanes, fused))
+            assert values == pytest.approx(expected, rel=AGREEMENT, abs=AGREEMENT, nan_ok=True)
 
 
 def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
     for name in set(one.variables) - {"point_seconds"}:
-        values, wanted = one[name].values, other[name].values
-        same = (values == wanted).all() if values.dtype == object else values.tobytes() == wanted.tobytes()
+        values, expected = one[name].values, other[name].values
+        same = (
+            (values == expected).all() if values.dtype == object else values.tobytes() == expected.tobytes()
+        )
         assert same, name
 
 

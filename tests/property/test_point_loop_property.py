@@ -35,9 +35,11 @@ def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
     """Assert that every variable is equal, except for the wall time of the points."""
     assert list(one.variables) == list(other.variables)
     for name in set(one.variables) - {"point_seconds"}:
-        values, wanted = one[name].values, other[name].values
-        assert (values.dtype, values.shape) == (wanted.dtype, wanted.shape), name
-        same = (values == wanted).all() if values.dtype == object else values.tobytes() == wanted.tobytes()
+        values, expected = one[name].values, other[name].values
+        assert (values.dtype, values.shape) == (expected.dtype, expected.shape), name
+        same = (
+            (values == expected).all() if values.dtype == object else values.tobytes() == expected.tobytes()
+        )
         assert same, name
 
 

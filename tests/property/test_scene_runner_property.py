@@ -46,8 +46,8 @@ def test_calls_have_the_bits_of_runs(drawn: tuple[list[str], list[list[float]]],
     with vi.runner(scene, keys) as motion:
         for point in values:
             found = motion(point)
-            wanted = vi.run(scene.with_values(dict(zip(keys, point, strict=True))), progress=False)
+            expected = vi.run(scene.with_values(dict(zip(keys, point, strict=True))), progress=False)
             for name, array in found.items():
-                own, values_of_run = np.asarray(array), wanted[name].values
+                own, values_of_run = np.asarray(array), expected[name].values
                 assert own.dtype.kind == "U" or own.tobytes() == values_of_run.tobytes(), name
-            assert str(found["message"]) == str(wanted.message.values)
+            assert str(found["message"]) == str(expected.message.values)

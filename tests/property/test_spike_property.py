@@ -63,8 +63,8 @@ def test_a_half_sine_is_above_a_threshold_as_long_as_its_formula_says(
     # interpolation between 40 samples a pulse costs less than .5 % of its length
     time = np.arange(2000) / 40_000.0
     signal = pulses(time, np.array([0.02 + offset / 40_000.0]), np.array([peak]), LENGTH)
-    asked = SpikeSettings(threshold=part * peak, minimum_samples=1)
-    found = measure_pulses(identify(channel(signal, 1.0 / 40_000.0), asked))
+    chosen = SpikeSettings(threshold=part * peak, minimum_samples=1)
+    found = measure_pulses(identify(channel(signal, 1.0 / 40_000.0), chosen))
     assert len(found) == 1
     expected = time_above(part * peak, np.array([peak]), LENGTH)
     assert found.duration == pytest.approx(expected, abs=5e-3 * LENGTH)

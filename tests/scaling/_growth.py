@@ -97,8 +97,8 @@ def problem_of(tokens: Tokens, folder: Path, rungs: int, library: str = "") -> s
     """
     found = ladder(tokens, folder, rungs)
     if library:
-        dear = [rung for rung in found if rung.seconds > LIBRARY_SECONDS]
-        return f"{library}: {_said(dear[:1])}, which is above {LIBRARY_SECONDS} s" if dear else None
+        expensive = [rung for rung in found if rung.seconds > LIBRARY_SECONDS]
+        return f"{library}: {_said(expensive[:1])}, which is above {LIBRARY_SECONDS} s" if expensive else None
     for three in zip(found, found[1:], found[2:], strict=False):
         if _is_steep(three):
             again = _quickest(tokens, three, folder)
@@ -137,14 +137,14 @@ def _said(rungs: Sequence[Rung]) -> str:
 
 
 def _rung(tokens: Tokens, count: int, folder: Path) -> Rung:
-    begun = time.process_time()
+    making_began = time.process_time()
     content = tokens.content(count)
     path = folder / tokens.name
     path.write_bytes(content)
     began = time.process_time()
     with suppress(VibroimpactError):
         tokens.read(path)
-    return Rung(count, len(content), time.process_time() - began, began - begun)
+    return Rung(count, len(content), time.process_time() - began, began - making_began)
 
 
 def each(line: str, before: str = "", after: str = "") -> Made:

@@ -100,7 +100,7 @@ class Child:
         wall, used = time.monotonic() - self._began, self._processor_time() - self._used
         if used <= limit and wall <= WALL_PER_PROCESSOR_TIME * limit:
             return None
-        where = self._asked_where_it_is()
+        where = self._place_of_hang()
         self._replace()
         return used, f"no answer after {used:.0f} s of processor time ({wall:.0f} s of wall time); {where}"
 
@@ -124,7 +124,7 @@ class Child:
             return 0.0
         return used.user + used.system + used.children_user + used.children_system
 
-    def _asked_where_it_is(self) -> str:
+    def _place_of_hang(self) -> str:
         if hasattr(signal, "SIGUSR1"):
             self._process.send_signal(signal.SIGUSR1)
             time.sleep(0.5)

@@ -27,7 +27,7 @@ def run(
     seconds: float,
     *,
     processes: int | None = None,
-    tell: Callable[[Tried], None] = lambda entry: None,
+    report: Callable[[Tried], None] = lambda entry: None,
 ) -> bool:
     """Try all cases of all kinds that the journal does not hold; return whether they are all tried.
 
@@ -50,9 +50,9 @@ def run(
     """
     end = time.monotonic() + seconds
     alone = [kind for kind in kinds if kind.is_alone]
-    beside = [kind for kind in kinds if not kind.is_alone]
-    parts = [(part, number) for part, number in ((alone, 1), (beside, processes)) if part]
-    return all([_run(part, counts, base, journal, end, number, tell) for part, number in parts])
+    shared = [kind for kind in kinds if not kind.is_alone]
+    parts = [(part, number) for part, number in ((alone, 1), (shared, processes)) if part]
+    return all([_run(part, counts, base, journal, end, number, report) for part, number in parts])
 
 
 def _run(
@@ -62,12 +62,12 @@ def _run(
     journal: Journal,
     end: float,
     processes: int | None,
-    tell: Callable[[Tried], None],
+    report: Callable[[Tried], None],
 ) -> bool:
     """Try the cases of kinds side by side until an instant; return whether they are all tried."""
     waiting = _waiting(kinds, counts, base, journal)
-    wanted = sum(counts[kind.name] for kind in kinds) - len(_tried(kinds, counts, journal))
-    children = [Child(kinds[0].package) for _ in range(min(processes or os.cpu_count() or 1, wanted))]
+    remaining = sum(counts[kind.name] for kind in kinds) - len(_tried(kinds, counts, journal))
+    children = [Child(kinds[0].package) for _ in range(min(processes or os.cpu_count() or 1, remaining))]
     busy = [child for child in children if _hand_next(child, waiting)]
     try:
         while busy and time.monotonic() < end:
@@ -76,7 +76,7 @@ def _run(
                 kind, case, seed = child.at
                 entry = Tried(kind.name, case, seed, round(taken, 4), problem)
                 journal.add(entry)
-                tell(entry)
+                report(entry)
                 if not _hand_next(child, waiting):
                     busy.remove(child)
     finally:

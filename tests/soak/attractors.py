@@ -45,7 +45,7 @@ MISSED = 2
 FREQUENCY = "forcing.angular_frequency"
 WEAK = 0.02
 """Distance of the largest multiplier from 1 below which a run of this length shows neither decay nor growth."""
-BESIDE = 1e-7
+NUDGE = 1e-7
 """Change of velocity of a run that starts close to an orbit, m/s."""
 
 Tables = dict[str, Any]
@@ -142,7 +142,7 @@ def _is_on(record: RunRecord, found: Basins, number: int) -> bool:
 # ---- branches ----
 
 
-class _Beside(NamedTuple):
+class _NearbyRun(NamedTuple):
     """Impact speeds of a run that starts close to an orbit, and whether the run stays on it."""
 
     speeds: Floats
@@ -199,17 +199,17 @@ def _unlike_its_runs(draw: random.Random, scene: Scene, branch: Branch) -> str |
         touches = each.orbit.highest[0] > -1e-3 * each.orbit.body.scale
         if abs(largest - 1.0) < WEAK or slow or touches:
             continue
-        beside = _run_beside(scene, each)
-        if beside.stays != (largest < 1.0):
-            word = "stays" if beside.stays else "leaves"
+        nearby = _run_nearby(scene, each)
+        if nearby.stays != (largest < 1.0):
+            word = "stays" if nearby.stays else "leaves"
             return (
                 f"multipliers {each.orbit.multipliers.tolist()} at {each.value:.12g}, and a run beside it {word}: "
-                f"{beside.speeds.tolist()} for {each.orbit.velocities.tolist()}"
+                f"{nearby.speeds.tolist()} for {each.orbit.velocities.tolist()}"
             )
     return None
 
 
-def _run_beside(scene: Scene, each: BranchOrbit) -> _Beside:
+def _run_nearby(scene: Scene, each: BranchOrbit) -> _NearbyRun:
     """Run from just after the first impact of an orbit, a little slower or faster."""
     orbit = each.orbit
     stop = scene.stops[int(orbit.contacts[0])]
@@ -218,7 +218,7 @@ def _run_beside(scene: Scene, each: BranchOrbit) -> _Beside:
             FREQUENCY: each.value,
             "forcing.phase": float(orbit.phases[0]) % (2.0 * np.pi),
             "body.displacement_start": stop.position,
-            "body.velocity_start": float(orbit.states[0][1]) + (BESIDE if stop.side == "lower" else -BESIDE),
+            "body.velocity_start": float(orbit.states[0][1]) + (NUDGE if stop.side == "lower" else -NUDGE),
             "record": {"transient_periods": PERIODS, "recorded_periods": 2 * orbit.periods},
         }
     )
@@ -231,4 +231,4 @@ def _run_beside(scene: Scene, each: BranchOrbit) -> _Beside:
     speeds = impacts[:, 2]
     expected = np.sort(np.tile(orbit.velocities, 2))
     stays = len(speeds) == len(expected) and np.allclose(np.sort(speeds), expected, rtol=1e-4, atol=1e-6)
-    return _Beside(speeds, bool(stays))
+    return _NearbyRun(speeds, bool(stays))

@@ -186,9 +186,9 @@ def _state_problem(scene: Scene, body: Structure) -> str | None:
 
 
 def _timed(scene: Scene, steps: int) -> tuple[Run, float]:
-    begun = time.process_time()
+    began = time.process_time()
     run = follow(scene, [scene.duration], stepped=[scene.duration * (i + 1) / steps for i in range(steps)])
-    return run, time.process_time() - begun
+    return run, time.process_time() - began
 
 
 def check(seed: int) -> str | None:

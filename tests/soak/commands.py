@@ -259,9 +259,11 @@ def _left(before: dict[str, bytes | None], words: list[str], code: int) -> str |
     )
     if code:
         return f"exit code {code}, yet changed: {changed}" if changed else None
-    asked = {str(Path(word.partition("=")[2] or word)) for word in words}
+    requested = {str(Path(word.partition("=")[2] or word)) for word in words}
     # without --output an export is named after its component
     strange = [
-        name for name in changed if name not in asked and not (words[0] == "fmu" and name.endswith(".fmu"))
+        name
+        for name in changed
+        if name not in requested and not (words[0] == "fmu" and name.endswith(".fmu"))
     ]
     return f"changed without being asked for: {strange}" if strange else None

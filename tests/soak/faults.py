@@ -153,7 +153,7 @@ class Command:
         return (1, f"processes outlived it: {outlived}") if outlived else (code, self.said()[-2000:])
 
 
-def _begun(*options: str) -> Command:
+def _started(*options: str) -> Command:
     """Start the command and wait until it has computed some points."""
     before = _parts_there()
     command = Command(*options)
@@ -170,7 +170,7 @@ def _parts_there() -> set[str]:
 
 def _workers(chance: random.Random, seconds: float) -> str | None:
     """Kill and stop workers and their fork server; stop all processes now and then, as Ctrl-Z and a closed lid do."""
-    command, end = _begun(), time.monotonic() + seconds
+    command, end = _started(), time.monotonic() + seconds
     while command.runs_for(min(chance.expovariate(0.5), end - time.monotonic())):
         if time.monotonic() >= end:
             break
@@ -187,7 +187,7 @@ def _workers(chance: random.Random, seconds: float) -> str | None:
 
 
 def _client(_chance: random.Random, seconds: float) -> str | None:
-    command = _begun()
+    command = _started()
     command.runs_for(seconds)
     return _killed(command)
 
@@ -201,7 +201,7 @@ def _killed(command: Command) -> str | None:
 
 def _disk(_chance: random.Random, seconds: float) -> str | None:
     """Fill the disk from some moment on: no file may grow."""
-    command = _begun()
+    command = _started()
     command.runs_for(seconds)
     for process in command.session():
         process.rlimit(psutil.RLIMIT_FSIZE, (FULL, FULL))
@@ -222,7 +222,7 @@ def _parts(chance: random.Random, seconds: float) -> str | None:
         part.write_bytes(DAMAGES[chance.choice(sorted(DAMAGES))](chance, sound))
         if part.read_bytes() not in (sound, sound[:-LINE_LENGTH]):
             hurt.append(part)
-    command = _begun()
+    command = _started()
     command.runs_for(seconds)
     said = command.said()
     unnamed = [part.name for part in hurt if f"{part.name} was damaged and is removed" not in said]
@@ -234,7 +234,7 @@ def _scheduler(chance: random.Random, seconds: float) -> str | None:
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"
     with _external(port) as first:
-        command = _begun("--scheduler", address)
+        command = _started("--scheduler", address)
         command.runs_for(0.3 * seconds)
         chance.choice(first[1:]).kill()
         command.runs_for(0.3 * seconds)

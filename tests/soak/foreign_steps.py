@@ -248,17 +248,17 @@ def _wrong_ticks(
         instants = shift + interval * np.arange(int(time[-1] / interval) + 2)
         expected = (instants[None] < time[:, None]).sum(axis=1)
         apart = np.minimum(apart, np.abs(instants[None] - time[:, None]).min(axis=1))
-        sure = (
+        clear = (
             np.abs(instants[None] - time[:, None]).min(axis=1) > 1e-9
         )  # a sample at a tick may come before or after it
-        if (counted[sure] != expected[sure]).any():
-            return f"{name}: {counted[sure].tolist()} ticks for {expected[sure].tolist()}"
+        if (counted[clear] != expected[clear]).any():
+            return f"{name}: {counted[clear].tolist()} ticks for {expected[clear].tolist()}"
         expected_total += (time[:, None] - instants[None]).clip(0.0).sum(axis=1)
     if not np.allclose(total, expected_total, rtol=0.0, atol=1e-8):
         return f"sum off by {float(np.abs(total - expected_total).max()):.2g}"
     last = tick[1] + tick[0] * (ticks - 1.0)
     expected_y = np.where(ticks > 0, 10.0 * ticks + (last if is_fed else 0.0), 0.0)
-    sure = apart > 1e-9
-    if not np.allclose(y[sure], expected_y[sure], rtol=0.0, atol=1e-9):
-        return f"y off by {float(np.abs(y - expected_y)[sure].max()):.2g}"
+    clear = apart > 1e-9
+    if not np.allclose(y[clear], expected_y[clear], rtol=0.0, atol=1e-9):
+        return f"y off by {float(np.abs(y - expected_y)[clear].max()):.2g}"
     return None

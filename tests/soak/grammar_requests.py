@@ -198,7 +198,9 @@ def _heads(draw: random.Random, body: bytes, sessions: Sessions) -> list[tuple[b
     return [(name.encode(), value.encode("utf-8", "surrogatepass")) for name, value in given.items()]
 
 
-async def _asked(app: Guarded, scope: dict[str, Any], body: bytes) -> tuple[int, dict[bytes, bytes], bytes]:
+async def _answered(
+    app: Guarded, scope: dict[str, Any], body: bytes
+) -> tuple[int, dict[bytes, bytes], bytes]:
     """Return status, headers and content of an answer."""
     waiting = [{"type": "http.request", "body": body, "more_body": False}]
     status, headers, content = 0, dict[bytes, bytes](), bytearray()
@@ -246,7 +248,7 @@ def check(seed: int) -> str | None:
         "extensions": {},
     }
     with files.bounded_memory() as grown:
-        status, headers, content = asyncio.run(_asked(app, scope, body))
+        status, headers, content = asyncio.run(_answered(app, scope, body))
     problem = _wrong(status, headers, content, method) or _opened(status, path, dict(heads))
     return (problem and f"{method} {path[:80]}?{query[:80]}: {problem}") or grown()
 

@@ -230,7 +230,7 @@ def check(seed: int) -> str | None:
     kind = draw.random()
     if kind < 0.5:
         path.write_bytes(_written(lines, dialect))
-        return _told(files.sound(path, truth, settings), dialect)
+        return _with_dialect(files.sound(path, truth, settings), dialect)
     if kind < 0.6 and dialect.encoding != "utf-16":
         path.write_bytes(_written(lines, dialect)[: -draw.randint(1, 60)])
         return _cut(path, truth, settings)
@@ -242,7 +242,7 @@ def check(seed: int) -> str | None:
     return files.odd(path, settings if draw.random() < 0.5 else None)
 
 
-def _told(problem: str | None, dialect: Dialect) -> str | None:
+def _with_dialect(problem: str | None, dialect: Dialect) -> str | None:
     return problem and f"{problem} ({dialect})"
 
 

@@ -69,9 +69,9 @@ def check(seed: int) -> str | None:
         early=draw.randrange(2),
         deadline=DEADLINE,
     )
-    told = draw.choice([""] * 9 + ["VIBROIMPACT_FAULTY_LOAD", "VIBROIMPACT_FAULTY_INSTANTIATE"])
-    with _environment({MARK: f"{os.getpid()} {seed}"} | ({told: str(fault)} if told else {}), fault):
-        problem = _loaded(text) if told else _tried(text, [0, fault, 0])
+    variable = draw.choice([""] * 9 + ["VIBROIMPACT_FAULTY_LOAD", "VIBROIMPACT_FAULTY_INSTANTIATE"])
+    with _environment({MARK: f"{os.getpid()} {seed}"} | ({variable: str(fault)} if variable else {}), fault):
+        problem = _loaded(text) if variable else _tried(text, [0, fault, 0])
         return problem or _left_behind(f"{os.getpid()} {seed}")
 
 

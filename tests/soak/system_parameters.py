@@ -107,8 +107,8 @@ def _problem(path: Path, taken: Mapping[str, float], lost: Sequence[str], *, is_
     try:
         imported = load_system(path)
     except VibroimpactError as refusal:
-        told = is_doubled and "expected one value of each parameter" in str(refusal)
-        return None if told else f"refused: {refusal}"
+        is_named = is_doubled and "expected one value of each parameter" in str(refusal)
+        return None if is_named else f"refused: {refusal}"
     if is_doubled:
         return "two values of one parameter, and no word on it"
     found: dict[str, float] = {}

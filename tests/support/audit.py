@@ -27,8 +27,8 @@ def lowest() -> Iterator[str]:
     lists = [project["dependencies"], *project["optional-dependencies"].values()]
     found: dict[str, str] = {}
     for requirement in map(Requirement, (line for each in lists for line in each)):
-        wanted = requirement.marker is None or requirement.marker.evaluate()
-        if requirement.name != project["name"] and wanted:
+        applies = requirement.marker is None or requirement.marker.evaluate()
+        if requirement.name != project["name"] and applies:
             (bound,) = (one.version for one in requirement.specifier if one.operator in (">=", "=="))
             found[requirement.name] = f"{requirement.name}=={bound}"
     yield from sorted(found.values(), key=str.lower)
@@ -39,19 +39,19 @@ def audited(what: str, *options: str) -> int:
     command = [sys.executable, "-m", "pip_audit", "--progress-spinner", "off", "--format", "json", *options]
     done = subprocess.run(command, capture_output=True, text=True)
     try:
-        asked = json.loads(done.stdout)["dependencies"]
+        answers = json.loads(done.stdout)["dependencies"]
     except (ValueError, KeyError):
         if any(word in done.stderr for word in UNREACHABLE):
-            asked = []
+            answers = []
         else:
             print(f"{what}: {done.stderr.strip()}", file=sys.stderr)
             return 1
-    answered = [one for one in asked if "vulns" in one]
+    answered = [one for one in answers if "vulns" in one]
     holes = [one for one in answered if one["vulns"]]
     for one in holes:
         print(f"{what}: {one['name']} {one['version']}: {', '.join(hole['id'] for hole in one['vulns'])}")
     if answered:
-        print(f"{what}: {len(answered)} of {len(asked)} packages are known, {len(holes)} with a hole.")
+        print(f"{what}: {len(answered)} of {len(answers)} packages are known, {len(holes)} with a hole.")
     else:
         # a package mirror has no advisories, and pip-audit reports its silence as "no known vulnerabilities"
         print(REMARK.format(what), file=sys.stderr)

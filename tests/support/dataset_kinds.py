@@ -112,7 +112,7 @@ KINDS = {
 }
 FOLDERS = {"campaign": "campaign", "measured sweep": "measured"}
 """Kinds whose file is the `dataset.nc` of a folder."""
-DEAR = ("accuracy",)
+SLOW = ("accuracy",)
 """Kinds that take seconds to make."""
 
 KEPT_ATTRIBUTES = (

@@ -22,12 +22,12 @@ def assert_memory_is_file(scene: Scene) -> xr.Dataset:
     with TemporaryDirectory() as folder:
         write_dataset(flat, Path(folder, "run.nc"))
         with open_dataset(Path(folder, "run.nc")) as opened_file:
-            wanted = opened_file.load()
-    xr.testing.assert_identical(found, wanted)
-    assert list(found.variables) == list(wanted.variables)
-    assert list(found.dims) == list(wanted.dims)
-    assert types(found.attrs) == types(wanted.attrs)
-    for name, variable in wanted.variables.items():
+            expected = opened_file.load()
+    xr.testing.assert_identical(found, expected)
+    assert list(found.variables) == list(expected.variables)
+    assert list(found.dims) == list(expected.dims)
+    assert types(found.attrs) == types(expected.attrs)
+    for name, variable in expected.variables.items():
         own = found.variables[name]
         assert (own.dtype, type(own)) == (variable.dtype, type(variable)), name
         assert types(own.attrs) == types(variable.attrs), name

@@ -62,12 +62,12 @@ def kept(name: str, key: str, make: Callable[[Path], None], folder: Path = FOLDE
         os.utime(path)
     except FileNotFoundError:
         folder.mkdir(parents=True, exist_ok=True)
-        beside = folder / f"{os.getpid()}-{threading.get_ident()}-{path.name}"
+        unfinished = folder / f"{os.getpid()}-{threading.get_ident()}-{path.name}"
         try:
-            make(beside)
-            beside.replace(path)
+            make(unfinished)
+            unfinished.replace(path)
         finally:
-            beside.unlink(missing_ok=True)
+            unfinished.unlink(missing_ok=True)
     return path
 
 

@@ -168,15 +168,15 @@ class Run:
 
 def follow(scene: Scene, times: Iterable[float], *, stepped: Sequence[float] = ()) -> Run:
     """Run a scene and store its states at these times; `stepped`: further times at which a step ends."""
-    asked, run = sorted(set(times)), Run()
+    instants, run = sorted(set(times)), Run()
     with scene.body() as body:
-        for time in sorted({*asked, *stepped}):
+        for time in sorted({*instants, *stepped}):
             if time <= body.time:
                 continue
             run.ended = body.advance(time - body.time, most_impacts=max(1, MOST_IMPACTS - len(body.impacts)))
             if run.ended == IMPACT_LIMIT:
                 return run
-            if time in asked:
+            if time in instants:
                 rows = body.impacts
                 run.times.append(time)
                 run.states.append(np.concatenate([body.displacement, body.velocity]))

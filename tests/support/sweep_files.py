@@ -14,10 +14,10 @@ def sweep_text(
     frequency: Any = None, *, inputs: tuple[dict[str, Any], ...] = (), rate: float = 5000.0, **sweep: Any
 ) -> str:
     """Return the text of a sweep file: an output of .5 V, inputs in addition to the tip, and keys of `[sweep]`."""
-    asked = frequency if frequency is not None else [18.0, 19.0, 20.5]
+    frequencies = frequency if frequency is not None else [18.0, 19.0, 20.5]
     tip = {"name": "tip", "terminal": "Dev1/ai0", "range": 5.0, "role": "displacement"}
     lines = ["[output]", 'terminal = "Dev1/ao0"', "amplitude = 0.5", f"rate = {rate!r}", "highest = 1.0"]
-    lines += ["slew = 1e6", "ramp_periods = 5", "[sweep]", f"frequency = {toml(asked)}"]
+    lines += ["slew = 1e6", "ramp_periods = 5", "[sweep]", f"frequency = {toml(frequencies)}"]
     chosen = {"transient_periods": 8, "recorded_periods": 4, **sweep}
     lines += [f"{key} = {toml(value)}" for key, value in chosen.items()]
     for each in (tip, *inputs):

@@ -61,20 +61,20 @@ def measure(keys: Sequence[str]) -> None:
         print(case.title, file=sys.stderr, flush=True)
         found, reference = measured(case)
         rows = [row.record() | {"cost": finite(row.cost)} for row in found]
-        told = {"key": case.key, "title": case.title, **{key: finite(v) for key, v in reference.items()}}
-        _put(told, rows)
+        summary = {"key": case.key, "title": case.title, **{key: finite(v) for key, v in reference.items()}}
+        _put(summary, rows)
 
 
 def _put(case: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     old = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {"cases": [], "rows": []}
     order = [one.key for one in cases()]
-    told = [one for one in old["cases"] if one["key"] != case["key"]] + [case]
+    entries = [one for one in old["cases"] if one["key"] != case["key"]] + [case]
     kept = [row for row in old["rows"] if row["case"] != case["key"]] + rows
     record = {
         "date": datetime.date.today().isoformat(),
         "machine": machine(),
         "one_period": finite(cost_of_a_run(orbit(1))),
-        "cases": sorted(told, key=lambda one: order.index(one["key"])),
+        "cases": sorted(entries, key=lambda one: order.index(one["key"])),
         "rows": sorted(kept, key=lambda row: order.index(row["case"])),
     }
     RECORD.parent.mkdir(exist_ok=True)
