@@ -1,4 +1,4 @@
-"""Write the tables of keys in docs/scene.md from the fields: `python docs/site/key_tables.py`."""
+"""The tables of keys in docs/scene.md, made of the fields: `python docs/site/key_tables.py`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Measure the prose of pages, docstrings and comments: `python docs/site/prose.py [PATH ...]` lists broken rules.
+"""Measure the prose of pages, docstrings and comments: `python docs/site/prose.py [PATH ...]` lists what breaks a rule.
 
-The rules are in CONTRIBUTING.md. Sentences have at most 25 words, paragraphs at most 500 characters, and no comment
+The rules stand in CONTRIBUTING.md. Sentences have at most 25 words, paragraphs at most 500 characters, and no comment
 begins with a relative that hides its noun. The last line gives the mean length of a sentence on the pages.
 """
 
@@ -28,7 +28,7 @@ HIDDEN_NOUN = re.compile(
 ABBREVIATIONS = re.compile(
     r"\b(e\.g|i\.e|cf|vs|eqs?|[Ff]igs?|[Ss]ec|[Nn]o|pp?|[Vv]ol|al|approx|resp|Dr|Prof)\.$"
 )
-#: Begin of a pragma, which is no prose.
+#: A pragma is no prose.
 PRAGMA = re.compile(r"(noqa|type:|ruff:|mypy:|pragma:|fmt:|clang-format|!)")
 
 
