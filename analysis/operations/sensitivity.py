@@ -16,7 +16,7 @@ from vibroimpact.fmus.operations import (
     study,
 )
 
-#: Of the intervals of Sobol indices.
+#: Confidence of the intervals of Sobol indices, and number of bootstrap resamples.
 LEVEL, RESAMPLES = 0.95, 1000
 
 
@@ -24,8 +24,8 @@ LEVEL, RESAMPLES = 0.95, 1000
 class Sensitivity(Operation):
     """Say how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
 
-    First order: by the key alone; total: with all that it takes part in; each with a bootstrap interval. The sweep of
-    the scene has two keys or more with a distribution, and sample = { design = "saltelli", points = 256 }.
+    First order: by the key alone; total: with all its interactions; each with a bootstrap interval. The sweep of the
+    scene needs two keys or more with a distribution, and sample = { design = "saltelli", points = 256 }.
 
     Example: vibroimpact sensitivity campaign -o sensitivity.nc --figure sensitivity.png
     """
