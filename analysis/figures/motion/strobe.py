@@ -1,4 +1,4 @@
-"""Figures of the motion seen once per forcing period: sections of one run, diagrams of a sweep."""
+"""Figures of the motion once per forcing period: sections of one run, diagrams of a sweep."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vibroimpact.analysis.figures.sweep.diagrams import draw_diagram, one_value,
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
-# Points of a section above which they are small, so that the layers of an attractor show.
+# Number of points of a section above which they are small, so that the layers of an attractor show.
 _MANY = 100
 
 
@@ -47,7 +47,7 @@ def draw_section(axis: Axes, run: xr.Dataset) -> None:
     for values, limits in ((x, "xlim"), (y, "ylim")):
         same = one_value(values.values)
         if same is not None:
-            # a single point: numbers around it to nine digits say nothing
+            # a single point: nine digits of axis numbers around it would be meaningless
             room = 0.5 * abs(same) or 1.0
             axis.set(**{limits: (same - room, same + room)})
     axis.xaxis.set_major_locator(MaxNLocator(5))
