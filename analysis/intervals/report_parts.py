@@ -18,12 +18,12 @@ from vibroimpact.analysis.intervals.variability import (
     rate,
 )
 
-# Report it when the share of delay points at (I, I) differs by more than this from what independent misses leave.
+# Difference of the share of delay points at (I, I) from its value for independent misses, above which it is reported.
 UNEXPLAINED = 0.1
 
 
 def interval_part(train: IntervalTrain) -> Rows:
-    """Return the intervals in their order; delay vectors are successive ones without a NaN."""
+    """Return the intervals in their order; delay vectors are successive intervals without a NaN."""
     along, begins = "interval_number", train.times[:-1]
     return {
         "interval": (along, train.separated, "s", "interspike interval, NaN where masked"),
@@ -78,7 +78,7 @@ def density_part(density: Density, cycle: Cycle) -> Rows:
 
 
 def gap_part(train: IntervalTrain, gaps: MissedBeats) -> tuple[Rows, str]:
-    """Return the gaps of a nearly periodic train, and in words how many or why none were looked for."""
+    """Return the gaps of a nearly periodic train, and their number or the reason for a refusal, in words."""
     starts, lengths = train.times[gaps.place], np.diff(train.times)[gaps.place]
     spread = "robust coefficient of variation of the intervals about their local median"
     words = f"{len(gaps.place)} found, {int(gaps.missing.sum())} missed beats"
