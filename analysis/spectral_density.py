@@ -55,8 +55,8 @@ class SpectralDensity:
 def spectral_density(values: Floats, rate: float, segment: int | None = None) -> SpectralDensity:
     """Return the power spectral density of evenly spaced samples: equations.md 8.8, thesis (B.1), (B.2).
 
-    Segments overlap by half and have the window 1 - |j - M/2| / (M/2). No mean is taken off, as in the thesis: the
-    mean of the signal shows in the lowest two frequencies.
+    Segments overlap by half and have the window 1 - |j - M/2| / (M/2). The mean is not removed, as in the thesis:
+    it shows in the lowest two frequencies.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def spectral_density(values: Floats, rate: float, segment: int | None = None) ->
     Raises
     ------
     UsageError
-        The segment is no power of two or longer than the signal; samples are not finite; or the rate is no rate.
+        The segment is no power of two or longer than the signal; samples are not finite; or the rate is not > 0.
 
     Examples
     --------

@@ -67,7 +67,7 @@ def marked(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     DatasetError
-        Names, dimensions, types or counts are wrong, so that no run can be told from another.
+        Names, dimensions, types or counts are wrong, so that runs cannot be distinguished.
     """
     problems = _problems(dataset)
     if problems:

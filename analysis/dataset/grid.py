@@ -1,4 +1,4 @@
-"""The runs of a dataset on the real dimensions of their sweep, with the ragged arrays beside them."""
+"""The runs of a dataset on the real dimensions of their sweep, and the ragged arrays."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Datase
     Parameters
     ----------
     name, first_name : str
-        Where the two come from, for the message.
+        Names of the files of both, for the message.
     part, first : xarray.Dataset
         One-dimensional.
 

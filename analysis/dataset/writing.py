@@ -84,9 +84,9 @@ def build_dataset(
     direction : sequence of Direction, length run
     run_index : ndarray of int, shape (run,)
         Index of each run in its campaign.
-    Names of the sampled variables, in the order of columns 1 on of `RunRecord.samples`; `component.variable`
-    in a general scene. In the file they have the names that `file_names` gives.
-        general scene. In the file they have the names that `file_names` gives.
+    sample_variables : sequence of str
+        Names of the sampled variables, in the order of columns 1 on of `RunRecord.samples`; `component.variable`
+        in a general scene. In the file they have the names that `file_names` gives.
     units : {"SI", "nondimensional"}
         Units of the scene.
     attrs : mapping, optional

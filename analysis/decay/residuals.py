@@ -32,7 +32,7 @@ class ResidualTest:
     portmanteau_probability : float
         Probability of such autocorrelations in white noise (Ljung-Box).
     runs_probability : float
-        Probability of so few or so many sign changes in white noise (Wald-Wolfowitz, two-sided).
+        Probability of a number of sign changes as unusual as this in white noise (Wald-Wolfowitz, two-sided).
     effective_samples : float
         Number of independent samples that carry the same information about the oscillation.
     """

@@ -39,8 +39,8 @@ class Forcing:
     ----------
     angular_frequency : float
         rad/s.
-    Force amplitude over stiffness, in the unit of the displacement; None: unknown, estimated.
-        Force amplitude over stiffness, in the unit of the displacement; None: not known, estimated.
+    static_deflection : float or None
+        Force amplitude over stiffness, in the unit of the displacement; None: unknown, estimated.
     phase : float or None
         At time 0 of the recording, rad; None: unknown, estimated.
     clock_drifts : bool

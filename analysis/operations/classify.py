@@ -10,7 +10,7 @@ from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Op
 
 @study("analysis.orbits.classify:ClassesOfDataset", Door("classify", without=("output",)))
 class Classify(Operation):
-    """Say what each run of a dataset is: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+    """Classify each run of a dataset: P(p,q), chaos, rest, sticking, no impacts, or unknown with the reason.
 
     The classes come from the strobe and the extrema of each recorded period. A slow transient differs from a doubled
     period by its distances, which shrink by a constant factor. Chaos needs 40 recorded periods.

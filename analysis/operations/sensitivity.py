@@ -22,7 +22,7 @@ LEVEL, RESAMPLES = 0.95, 1000
 
 @study("analysis.sensitivity.report:SensitivityOfCampaign", Door("sensitivity"))
 class Sensitivity(Operation):
-    """Say how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
+    """Compute the share of each drawn key of a campaign in the variance of each result (Sobol indices).
 
     First order: by the key alone; total: with all its interactions; each with a bootstrap interval. The sweep of the
     scene needs two keys or more with a distribution, and sample = { design = "saltelli", points = 256 }.

@@ -34,12 +34,12 @@ class Mechanics:
         Effective mass of the contact, kg.
     restitution : float or None
     sensitivity : float or None
-        Of the load cell, V/N; that of its scene, for a simulated one.
-    Sensitivity of the load cell, V/N; that of its scene, for a simulated one.
-        N s, one for each spike: the sensitivity is fitted.
-    N s, one for each spike: the sensitivity is fitted to them.
-        Part of the peak down to which a pulse is integrated.
-    Share of the peak down to which a pulse is integrated.
+        Sensitivity of the load cell, V/N; that of its scene, for a simulated one.
+    known_impulses : ndarray of float or None
+        N s, one for each spike: the sensitivity is fitted to them.
+    foot : float
+        Share of the peak down to which a pulse is integrated.
+    waveform : str
         Waveform for the impulse below that level, or "auto".
     """
 

@@ -69,7 +69,7 @@ def _draw_bars(axis: Axes, own: xr.Dataset) -> None:
 
 
 def _draw_lines(axis: Axes, own: xr.Dataset, along: str) -> None:
-    """Draw total indices with their intervals, up and down sweeps apart."""
+    """Draw total indices with their intervals, one line for each direction of the sweep."""
     values = own[along].values
     for number, parameter in enumerate(own["parameter"].values.tolist()):
         colour = COLOURS[number % len(COLOURS)]

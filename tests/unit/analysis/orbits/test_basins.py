@@ -29,8 +29,8 @@ BORDER = 0.3
 class KnownMap:
     """A map: starts left of BORDER go to (-1, 0), starts from there to 3 to a cycle of two, others never settle.
 
-    The chaotic starts above y = 0 hit a second stop at a rate of their own; with `bridge`, a share of them changes
-    over.
+    The chaotic starts above y = 0 hit a second stop at a rate of their own. The share `bridge` of all chaotic starts
+    changes over.
     """
 
     def __init__(
