@@ -88,7 +88,7 @@ def spectral_density(values: Floats, rate: float, segment: int | None = None) ->
     signal = np.asarray(values, dtype=np.float64)
     if signal.ndim != 1 or signal.size < _FEWEST or not np.isfinite(signal).all():
         raise UsageError(
-            f"spectrum: expected a row of {_FEWEST} finite samples at least, got {_told(signal)}."
+            f"spectrum: expected a row of {_FEWEST} finite samples at least, got {_description(signal)}."
         )
     if not (np.isfinite(rate) and rate > 0.0):
         raise UsageError(f"spectrum: rate: expected a sampling rate > 0, Hz, got {rate}.")
@@ -103,7 +103,7 @@ def spectral_density(values: Floats, rate: float, segment: int | None = None) ->
     return SpectralDensity(frequency, density, length, (signal.size - length // 2) // (length // 2))
 
 
-def _told(signal: Floats) -> str:
+def _description(signal: Floats) -> str:
     if signal.ndim != 1:
         return f"an array of shape {signal.shape}"
     return (

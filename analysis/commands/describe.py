@@ -149,8 +149,8 @@ def _values(data: xr.Dataset, name: str) -> str:
         return "none"
     error = next((data[name + ending] for ending in _ERRORS if name + ending in data), None)
     if len(values) == 1:
-        doubt = np.nan if error is None else float(np.ravel(error.values)[0])
-        return with_error(float(values[0]), doubt)
+        standard_error = np.nan if error is None else float(np.ravel(error.values)[0])
+        return with_error(float(values[0]), standard_error)
     least, most = finite.min(), finite.max()
     text = f"{least:.6g}" if least == most else f"{least:.6g} to {most:.6g}"
     if error is not None:

@@ -75,10 +75,10 @@ def _prepared(kind: type[Study[Any]], options: Studied, stack: ExitStack) -> Stu
     try:
         return kind.prepare(options, stack)
     except KeyboardInterrupt:
-        raise _nothing(kind) from None
+        raise _nothing_yet(kind) from None
 
 
-def _nothing(kind: type[Study[Any]]) -> Interrupted:
+def _nothing_yet(kind: type[Study[Any]]) -> Interrupted:
     return Interrupted(f"{kind.name}: interrupted before there was {kind.nothing}.")
 
 
@@ -96,7 +96,7 @@ def _followed(study: Study[Any]) -> Exception | None:
         study.incomplete = ""
     except KeyboardInterrupt:
         if study.is_empty:
-            raise _nothing(type(study)) from None
+            raise _nothing_yet(type(study)) from None
     except Exception as problem:
         if study.is_empty:
             raise

@@ -30,7 +30,7 @@ _RECORD_KEYS = {
 }
 
 # Relative distance from the only value of a parameter within which a selection means that value.
-_SAME = 1e-6
+_SAME_VALUE = 1e-6
 
 
 class VibroimpactAccessor:
@@ -255,7 +255,7 @@ def _matches(
             raise DatasetError(f"selection: {name}: expected a number, got {value}.")
         there = np.unique(values[left])
         nearest = there[np.argmin(np.abs(there - value))]
-        if not abs(value - nearest) <= _room_beyond(there, value):
+        if not abs(value - nearest) <= _half_step(there, value):
             raise DatasetError(
                 f"selection: {name}: expected {_span(there)}, got {value:g}. "
                 "Give a value that was computed, or near one."
@@ -264,10 +264,10 @@ def _matches(
     return np.asarray(values == value)
 
 
-def _room_beyond(there: NDArray[Any], value: float) -> float:
+def _half_step(there: NDArray[Any], value: float) -> float:
     """Return the largest distance of a value from the nearest known one: half a step, also beyond the ends."""
     if there.size == 1:
-        return float(_SAME * abs(there[0]))
+        return float(_SAME_VALUE * abs(there[0]))
     if there[0] <= value <= there[-1]:
         return math.inf
     return float(0.5 * (there[1] - there[0] if value < there[0] else there[-1] - there[-2]))

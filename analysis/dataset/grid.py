@@ -196,7 +196,7 @@ def _grid(
         sizes[dimension] = len(values)
         places.append(place)
     axes |= shared_axes(axes)
-    run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])
+    run_id = _run_grid(tuple(sizes.values()), places, flat.sizes["run"])
     if run_id is None:
         return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
     return tuple(sizes), axes, scalars, run_id
@@ -260,7 +260,7 @@ def _in_order_of_the_scene(flat: Flat) -> list[str]:
     return sorted(swept_names(flat), key=lambda name: linked.index(name) if name in linked else len(linked))
 
 
-def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
+def _run_grid(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
     """Return the run at each grid point, or None when the runs form no grid."""
     size = int(np.prod(shape, dtype=np.int64))
     if runs == 0 or size > _LARGEST_GRID_PER_RUN * runs:

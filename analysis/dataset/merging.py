@@ -138,9 +138,11 @@ def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Datase
             f"got a difference in {', '.join(sorted(map(str, different)))}."
         )
     for dimension in _SHARED_SIZES:
-        wanted, got = first.sizes.get(dimension), part.sizes.get(dimension)
-        if wanted != got:
-            raise DatasetError(f"{name}: {dimension}: expected the size {wanted} of {first_name}, got {got}.")
+        expected, got = first.sizes.get(dimension), part.sizes.get(dimension)
+        if expected != got:
+            raise DatasetError(
+                f"{name}: {dimension}: expected the size {expected} of {first_name}, got {got}."
+            )
     _refuse_other_meaning(name, part, first_name, first)
 
 
@@ -148,16 +150,16 @@ def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: x
     """Raise DatasetError if equal names or numbers mean something else than in the first part."""
     for variable, meaning in first.variables.items():
         for key in _MEANING if variable in part.variables else ():
-            wanted, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
-            if wanted != got:
+            expected, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
+            if expected != got:
                 raise DatasetError(
-                    f"{name}: {variable}: expected {key} {wanted!r} as in {first_name}, got {got!r}."
+                    f"{name}: {variable}: expected {key} {expected!r} as in {first_name}, got {got!r}."
                 )
     for label in [name for name, variable in first.variables.items() if _is_shared(name, variable)]:
-        wanted, got = (np.atleast_1d(source.variables[label].values) for source in (first, part))
-        if not np.array_equal(wanted, got):
+        expected, got = (np.atleast_1d(source.variables[label].values) for source in (first, part))
+        if not np.array_equal(expected, got):
             raise DatasetError(
-                f"{name}: {label}: expected those of {first_name} ({', '.join(map(str, wanted))}), "
+                f"{name}: {label}: expected those of {first_name} ({', '.join(map(str, expected))}), "
                 f"got {', '.join(map(str, got))}."
             )
 

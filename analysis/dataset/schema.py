@@ -400,8 +400,8 @@ def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAME
             raise DatasetError(f"dataset: {quantity}: expected each quantity once, got it twice.")
         plain = file_name_of(quantity)
         # CF wants a letter first.
-        wanted = plain if plain[:1].isalpha() else f"variable_{plain}".strip("_")
-        choices = (wanted, *(f"{wanted}_{number}" for number in range(2, len(used) + 3)))
+        base = plain if plain[:1].isalpha() else f"variable_{plain}".strip("_")
+        choices = (base, *(f"{base}_{number}" for number in range(2, len(used) + 3)))
         name = next(choice for choice in choices if choice.lower() not in used)
         used.add(name.lower())
         found[quantity] = name

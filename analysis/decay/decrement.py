@@ -17,7 +17,7 @@ _SMALLEST = 3.0
 """Height of a peak, in standard errors, below which its logarithm is biased, and the peak is left out."""
 _LAGS_TURN = 1.25
 """Phase per peak, rad, at which the two periods of the residual test span ten peaks."""
-_BENT = 3.0
+_CURVED = 3.0
 """Curvature of ln(peak) over n, in standard errors, above which the logarithm counts as bent."""
 
 
@@ -112,11 +112,11 @@ def logarithmic_decrement(samples: DecaySamples) -> Decrement:
         peaks,
         float(-2.0 * curve[1]),
         float(-2.0 * (curve[1] + 2.0 * curve[2] * number[-1])),
-        bool(abs(curve[2]) > _BENT * bends[2]) or _wanders(off_line),
+        bool(abs(curve[2]) > _CURVED * bends[2]) or _is_systematic(off_line),
     )
 
 
-def _wanders(off_line: Floats) -> bool:
+def _is_systematic(off_line: Floats) -> bool:
     """Tell whether the residual of a line is no noise; alternating sides mean a wrong equilibrium, not a bend."""
     alternates = np.mean(np.diff(off_line, 2) ** 2) >= 6.0 * np.mean(off_line**2)
     return bool(not alternates and not residual_test(off_line, 1.0, _LAGS_TURN).adequate)

@@ -98,28 +98,28 @@ class FreeDecay:
 
     def words(self) -> tuple[str, ...]:
         """Return the remarks for a reader, in sentences."""
-        said = list(self.samples.remarks)
+        sentences = list(self.samples.remarks)
         rate = self.exponential.decay_rate
         if rate.interval[0] <= 0.0:
-            said.append(
+            sentences.append(
                 "the motion does not decay by more than its error: it is driven, or the window too short."
             )
-        said.append(f"the decaying cosine is {self.exponential.test.words()}.")
+        sentences.append(f"the decaying cosine is {self.exponential.test.words()}.")
         if self.decrement is not None and self.decrement.bent:
-            said.append(
+            sentences.append(
                 f"the logarithm of the peaks is not a straight line (decrement about {self.decrement.first:.3g} at "
                 f"first, {self.decrement.last:.3g} at last): the damping is not viscous alone."
             )
         if self.second is not None:
-            said.append(
+            sentences.append(
                 f"{self.second.words}. Two decaying cosines describe the motion, and no damping law is chosen."
             )
         elif self.choice is not None:
-            said += self.choice.words()
+            sentences += self.choice.words()
         if self.backbone is not None:
-            said.append(self.backbone.words(self.samples.unit))
-        said += [message(f"{method}: ", reason) for method, reason in self.refusals.items()]
-        return tuple(said)
+            sentences.append(self.backbone.words(self.samples.unit))
+        sentences += [message(f"{method}: ", reason) for method, reason in self.refusals.items()]
+        return tuple(sentences)
 
     def dataset(self) -> xr.Dataset:
         """Return the dataset: estimates (method, quantity), motion, laws, peaks and windows, where available."""

@@ -239,13 +239,13 @@ class LawChoice:
         Best first, by AIC; laws with a negative coefficient come last.
     effective_samples : float
         Number of independent samples, from the residual of the best law; the same number for all laws.
-    lost : tuple of DampingLaw
+    failed : tuple of DampingLaw
         Laws whose fit ended in damping beyond any swing.
     """
 
     fits: tuple[LawFit, ...]
     effective_samples: float
-    lost: tuple[DampingLaw, ...] = ()
+    failed: tuple[DampingLaw, ...] = ()
 
     @property
     def best(self) -> LawFit:
@@ -271,35 +271,35 @@ class LawChoice:
     def words(self) -> tuple[str, ...]:
         """Return the choice of the law and its quality, in sentences."""
         best, other = self.best, self.best_by_effective_samples
-        said = [f"{spoken(best.law)} {'has the lowest AIC' if len(self.fits) > 1 else 'was asked for'}."]
+        sentences = [f"{spoken(best.law)} {'has the lowest AIC' if len(self.fits) > 1 else 'was asked for'}."]
         if not best.physical:
-            said.append(
+            sentences.append(
                 "a coefficient of it is negative: it feeds energy in; no law here is a damping of this motion."
             )
-        said.append(f"{spoken(best.law)} is {best.test.words()}.")
+        sentences.append(f"{spoken(best.law)} is {best.test.words()}.")
         if len(self.fits) > 1 and not best.test.adequate:
             good = [fit for fit in self.fits if fit.test.adequate and fit.physical]
-            said.append(
+            sentences.append(
                 "none of the laws is adequate: coefficients and errors describe the best of the wrong models."
                 if not good
                 else f"adequate by its residual: {_named(good)}."
             )
         count = len(best.fitted)
         if len(self.fits) > 1 and self.effective_samples < 0.8 * count:
-            said.append(
+            sentences.append(
                 f"AIC assumes white residuals; these are correlated, and {count} samples are worth "
                 f"{self.effective_samples:.0f}: with that number {spoken(other.law)} "
                 f"{'stays the first' if other is best else 'wins'}."
             )
-        odd = [fit for fit in self.fits if not fit.physical]
-        if odd and best.physical:
-            said.append(f"left out for a negative coefficient: {_named(odd)}.")
-        if self.lost:
-            said.append(f"could not be fitted: {', '.join(map(spoken, self.lost))}.")
+        unphysical = [fit for fit in self.fits if not fit.physical]
+        if unphysical and best.physical:
+            sentences.append(f"left out for a negative coefficient: {_named(unphysical)}.")
+        if self.failed:
+            sentences.append(f"could not be fitted: {', '.join(map(spoken, self.failed))}.")
         unsettled = [fit for fit in self.fits if not fit.settled]
         if unsettled:
-            said.append(f"not settled within the limit of steps: {_named(unsettled)}.")
-        return tuple(said)
+            sentences.append(f"not settled within the limit of steps: {_named(unsettled)}.")
+        return tuple(sentences)
 
 
 def _named(fits: Sequence[LawFit]) -> str:
@@ -332,15 +332,15 @@ def choose_law(
     """
     envelope = first_guess(samples).envelope
     start = fit_exponential(samples) if start is None else start
-    found, lost = [], []
+    found, failed = [], []
     for law in laws:
         try:
             found.append(fit_law(samples, law, start, envelope, cubic=cubic))
         except EstimationError:
-            lost.append(law)
+            failed.append(law)
     if not found:
         raise EstimationError(
             f"{samples.name}: expected a decay that some law fits, got none. Narrow the window."
         )
     ranked = sorted(found, key=lambda fit: (not fit.physical, fit.aic))
-    return LawChoice(tuple(ranked), ranked[0].test.effective_samples, tuple(lost))
+    return LawChoice(tuple(ranked), ranked[0].test.effective_samples, tuple(failed))

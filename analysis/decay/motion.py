@@ -95,21 +95,21 @@ def half_swings(start: Floats, amplitude: Floats, coefficients: Coefficients, un
     """
     terms = _Terms(coefficients)
     time, height = start.astype(float), amplitude.astype(float)
-    rests = np.zeros(len(time), bool)
+    at_rest = np.zeros(len(time), bool)
     shape = np.zeros((_ORDER + 1, len(time)))
     swings: list[tuple[Floats, ...]] = []
     with np.errstate(all="ignore"):
-        while np.any(~rests & (time < until)) and len(swings) < _MOST_SWINGS:
-            last = ~rests & (height <= _LAST_SWING * terms.dead)
+        while np.any(~at_rest & (time < until)) and len(swings) < _MOST_SWINGS:
+            last = ~at_rest & (height <= _LAST_SWING * terms.dead)
             swing, shape = _free_swing(height, shape, terms)
             if last.any():
                 swing = _replaced(swing, last, _last_swing(height, terms.dead, coefficients))
-            if rests.any():
-                swing = _replaced(swing, rests, _rest(height, coefficients))
+            if at_rest.any():
+                swing = _replaced(swing, at_rest, _rest(height, coefficients))
             side = -1.0 if len(swings) % 2 else 1.0
             swings.append((time + swing[0], *(side * part for part in swing[1:])))
             time, height = time + swing[0][-1], -swing[1][-1]
-            rests = rests | last | ~np.isfinite(height)
+            at_rest = at_rest | last | ~np.isfinite(height)
     return Nodes(*(np.array(part) for part in zip(*swings, strict=True)))
 
 

@@ -34,7 +34,7 @@ _ROUNDING = 1e-12
 """Distance of the coherence from 1 below which the distance is rounding, and errors are unknown."""
 _BY_CHANCE = 1e-3
 """Probability of a larger misfit by chance alone, below which the band holds more than one resonance."""
-_OFF = 0.01
+_LARGEST_MISFIT = 0.01
 """Misfit over the peak above which one resonance does not describe lines whose errors are unknown."""
 _FEW_LINES = 0.5
 """Lines in the half-power bandwidth below which the lines show leakage instead of the resonance."""
@@ -322,7 +322,7 @@ def _misfit(curve: Curve, found: OptimizeResult) -> tuple[str, ...]:
         return ()
     # residuals are shares of the peak here
     rms = float(np.sqrt(np.mean(left)))
-    if rms > _OFF and not residual_test(found.fun, 1.0, np.pi / 2.0).adequate:
+    if rms > _LARGEST_MISFIT and not residual_test(found.fun, 1.0, np.pi / 2.0).adequate:
         return (f"the fit leaves {100.0 * rms:.2g} % of the peak, and not as noise: {why}",)
     return ()
 

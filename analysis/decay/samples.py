@@ -112,12 +112,12 @@ def unit_power(unit: str, power: int) -> str:
 
 def clock_remark(channel: Channel) -> list[str]:
     """Return the warning that all frequencies share the uncertainty of the clock, if it has one."""
-    doubt = channel.axis.interval_uncertainty
+    error = channel.axis.interval_uncertainty
     words = (
-        f"{channel.name}: the clock of this recording is uncertain by {100 * doubt:.2g} %, and with it every frequency "
+        f"{channel.name}: the clock of this recording is uncertain by {100 * error:.2g} %, and with it every frequency "
         "and decay rate; the standard errors do not count that. Damping ratios do not change."
     )
-    return [words] if doubt else []
+    return [words] if error else []
 
 
 def _largest_excursion(time: Floats, value: Floats) -> float:

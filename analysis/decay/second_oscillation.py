@@ -14,11 +14,11 @@ from vibroimpact.analysis.decay.residuals import residual_test
 from vibroimpact.analysis.decay.samples import DecaySamples, Floats
 from vibroimpact.fmus.errors import EstimationError
 
-_LINES_APART = 1.5
+_LINE_DISTANCE = 1.5
 """Distance from the first frequency, in 1 / (length of the record), below which the first may just change slowly."""
 _EXPLAINED = 0.9
 """Share of the residual's variance that a second oscillation must explain if the rest is no noise."""
-_CLEARLY = 30.0
+_AIC_DIFFERENCE = 30.0
 """Difference of Akaike's criterion above which two cosines are better than a damping law.
 
 The highest of thousands of lines of noise takes about 15 off the criterion.
@@ -47,7 +47,7 @@ class SecondOscillation:
 
     def better_than(self, aic: float) -> bool:
         """Tell whether two cosines describe the decay better than a fit with this criterion."""
-        return self.aic < aic - _CLEARLY
+        return self.aic < aic - _AIC_DIFFERENCE
 
     @property
     def words(self) -> str:
@@ -65,7 +65,7 @@ def second_oscillation(samples: DecaySamples, first: ExponentialDecay) -> Second
     """
     residual = samples.value - first.fitted
     time = samples.time - samples.time[0]
-    apart = _LINES_APART * 2.0 * np.pi / float(time[-1])
+    apart = _LINE_DISTANCE * 2.0 * np.pi / float(time[-1])
     omega, own = first.angular_frequency.value, first.decay_rate.value
     try:
         start = spectral_peak(replace(samples, value=residual))

@@ -76,12 +76,12 @@ def swept_response(
 
 
 def _remarks(left_out: int, others: list[str], half: Floats) -> tuple[str, ...]:
-    said = []
+    found = []
     if left_out:
-        said.append(f"{left_out} runs that hit a stop, or did not finish, are left out.")
+        found.append(f"{left_out} runs that hit a stop, or did not finish, are left out.")
     if others:
-        said.append(f"{', '.join(others)} is swept too: runs of all its values are taken together.")
+        found.append(f"{', '.join(others)} is swept too: runs of all its values are taken together.")
     spread = float(np.max(np.ptp(half, axis=1) / np.max(half)))
     if spread > 1e-6:
-        said.append(f"amplitudes still change by {spread:.1g} between periods: the transients are not over.")
-    return tuple(said)
+        found.append(f"amplitudes still change by {spread:.1g} between periods: the transients are not over.")
+    return tuple(found)

@@ -20,7 +20,7 @@ from vibroimpact.analysis.estimation.physics import Floats
 from vibroimpact.analysis.estimation.signals import Signal
 
 # Probability of a larger deviation by chance alone, below which a flight does not follow the others' parabolas.
-_SELDOM = 1e-4
+_REJECTION = 1e-4
 # Relative difference of two bends up to which they have one acceleration, even where their errors are smaller.
 _SAME_BEND = 0.25
 # Jump of the velocity over g (T1 + T2) below which a boundary is no impact: half of the 1/2 at a true impact.
@@ -137,19 +137,19 @@ def _judged(signal: Signal, index: NDArray[np.intp], fit: BounceFit) -> FittedBo
     noise = math.sqrt(fit.square / freedom)
     least = _EXACT * signal.range
     places = np.searchsorted(time, fit.instants[1:-1])
-    left, lost = 0.0, 0
+    left, spent = 0.0, 0
     for since, rest in zip(np.split(time, places), np.split(residual, places), strict=True):
         degree = min(_DEGREE, len(since) - 1)
         if degree >= 0:
             abscissa = (since - since[0]) / max(float(np.ptp(since)), 1e-300)
             columns = np.polynomial.legendre.legvander(2.0 * abscissa - 1.0, degree)
             after = rest - columns @ np.linalg.lstsq(columns, rest, rcond=None)[0]
-            left, lost = left + float(after @ after), lost + degree + 1
-    more, over = lost - len(fit.covariance), len(index) - lost
+            left, spent = left + float(after @ after), spent + degree + 1
+    more, over = spent - len(fit.covariance), len(index) - spent
     if noise < least or more < 1 or over < 1 or not left > 0.0:
         return FittedBounces(signal, index, fit, max(noise, signal.noise), 1.0, True)
     ratio = (fit.square - left) / more / (left / over)
-    adequate = bool(fdtrc(more, over, ratio) > _SELDOM)
+    adequate = bool(fdtrc(more, over, ratio) > _REJECTION)
     return FittedBounces(signal, index, fit, noise, 1.0 if adequate else ratio, adequate)
 
 
@@ -298,7 +298,7 @@ def _follows(points: Points, chain: Sequence[Piece], last: bool, sign: float) ->
     piece = chain[-1 if last else 0]
     part = slice(len(index) - piece.count, None) if last else slice(0, piece.count)
     square = float(np.sum((values[part] - fit.fitted[part]) ** 2))
-    return square <= variance * float(chdtri(piece.count, _SELDOM)) * (1.0 + 3.0 / math.sqrt(free))
+    return square <= variance * float(chdtri(piece.count, _REJECTION)) * (1.0 + 3.0 / math.sqrt(free))
 
 
 def _start(points: Points, chain: Sequence[Piece], sign: float) -> tuple[Floats, float, float]:

@@ -21,7 +21,7 @@ from vibroimpact.analysis.estimation.smoothing import choose_window
 from vibroimpact.fmus.errors import EstimationError
 
 # Window of the noiseless motion, in periods of the fastest motion: short enough to leave the motion unchanged.
-_FINE = 0.15
+_NOISELESS_WINDOW = 0.15
 _SAMPLES_PER_SPAN = 6
 _MOST_FAILED = 0.1
 # Quantities whose true value is known for the noiseless motion.
@@ -59,7 +59,7 @@ def resample(record: Prepared, draws: int, seed: int) -> Resampled:
         motion[one.flight.index] -= one.residual
     rounding = 1e-12 * float(np.ptp(motion[signal.good]))
     noiseless = replace(signal, values=motion, noise=rounding)
-    fine_window = max(_FINE * 2.0 * np.pi / fastest, _SAMPLES_PER_SPAN * signal.interval)
+    fine_window = max(_NOISELESS_WINDOW * 2.0 * np.pi / fastest, _SAMPLES_PER_SPAN * signal.interval)
     window = choose_window(noiseless, flights, fine_window, fastest, record.fit.noise)
     balance = EnergyBalance(signal, flights, parameters.angular_frequency, window)
     fine = EnergyBalance(noiseless, flights, parameters.angular_frequency, fine_window)

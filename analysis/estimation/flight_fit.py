@@ -27,7 +27,7 @@ _MOST_STEPS, _MOST_HALVINGS = 10, 12
 # Predicted decrease of chi squared in a step below which the search ends.
 _SETTLED = 1e-3
 # Residual, in ranges of the signal, assigned to a trial that is no oscillator.
-_FAR = 1e3
+_UNPHYSICAL_RESIDUAL = 1e3
 # Number of Newton steps to an instant on motion of constant acceleration.
 _NEWTON_STEPS = 4
 # Largest shift of an end of a flight, over the duration of the flight.
@@ -93,7 +93,7 @@ def search_flights(
         trial = coordinates.parameters(origin + scale * x)
         if trial is None or trial.damping_ratio < 0.0:
             # no oscillator; the large residual makes the search shorten its step
-            return np.full(sum(counts), _FAR * signal.range)
+            return np.full(sum(counts), _UNPHYSICAL_RESIDUAL * signal.range)
         return np.concatenate([fit_flight(signal, flight, trial).residual for flight in flights])
 
     freedom = max(sum(counts) - 2 * len(flights) - len(names), 1)
@@ -271,12 +271,12 @@ def cut_at_level(
     found = []
     for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
         weights = one.gain[0], one.to_end[0, :2] @ one.gain
-        doubts = [
+        margins = [
             DOUBTFUL * noise * float(np.linalg.norm(row)) / max(abs(float(speed)), 1e-300)
             for row, speed in zip(weights, (one.state[1], one.end_state[1]), strict=True)
         ]
-        first = int(np.searchsorted(signal.time, start + doubts[0], side="right"))
-        last = int(np.searchsorted(signal.time, end - doubts[1], side="left"))
+        first = int(np.searchsorted(signal.time, start + margins[0], side="right"))
+        last = int(np.searchsorted(signal.time, end - margins[1], side="left"))
         index = np.arange(first, last)
         index = index[signal.good[index]]
         enough = len(index) >= FEWEST_IN_FLIGHT

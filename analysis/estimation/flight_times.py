@@ -26,9 +26,9 @@ from vibroimpact.fmus.errors import EstimationError
 
 FLIGHT_TIMES = "flight_times"
 # Probability of a larger scatter of the ratios by chance alone, below which they are not one ratio.
-_SELDOM = 1e-4
+_REJECTION = 1e-4
 # Probability of the scatter about r(v) below which r(v) gets one more power of the speed's logarithm.
-_RATHER = 0.1
+_TERM_PROBABILITY = 0.1
 # Change of r(v) below which one ratio is given; largest share of the scatter about one ratio that r(v) may leave.
 _SAME_RATIO, _CLEARER = 2e-3, 0.1
 # Deviation from the median length, relative, above which a flight is not of P(1,1); largest share of such flights.
@@ -159,7 +159,7 @@ def _generalized(columns: Floats, target: Floats, covariance: Floats) -> tuple[F
     return solution, uncertain, float(np.sum((aim - scaled @ solution) ** 2))
 
 
-def _by_chance(square: float, freedom: int, probability: float = _SELDOM) -> bool:
+def _by_chance(square: float, freedom: int, probability: float = _REJECTION) -> bool:
     from scipy.stats import chi2
 
     return square <= float(chi2.isf(probability, freedom))
@@ -198,7 +198,7 @@ def _of_speed(seen: BounceFlights, confidence: float) -> tuple[RestitutionOfSpee
             speeds, np.exp(ratios), np.exp(level), np.exp(level - reach), np.exp(level + reach)
         )
         excess = 0.0 if _by_chance(square, freedom) else widened
-        if _by_chance(square, freedom, _RATHER):
+        if _by_chance(square, freedom, _TERM_PROBABILITY):
             break
     return found, excess
 

@@ -31,14 +31,14 @@ from vibroimpact.fmus.errors import EstimationError, UsageError
 Estimates = dict[str, MethodEstimate]
 
 # Size of a damping ratio in standard errors above which it counts as separated from restitution or force, by method.
-_CLEAR = {"energy_joint": 0.5, "energy_amplitude": 3.0}
+_SEPARABLE = {"energy_joint": 0.5, "energy_amplitude": 3.0}
 _RESTITUTIONS = ("restitution", "energy_loss_factor")
 # Standard error of the restitution, relative to noise over samples, below which the interval has no width.
 _NO_WIDTH = 1e-3
 # Numerical errors of a method on motion far from its model; the failure of one method leaves the others.
 _FAILURES = (EstimationError, UsageError, ArithmeticError, ValueError)
 # Uncertainty of the instants (rad of the fastest motion) above which impact speeds err by more than stated.
-_INSTANT_DOUBT = 0.1
+_INSTANT_ERROR = 0.1
 
 
 def estimate_impacts(
@@ -93,7 +93,7 @@ def estimate_impacts(
         )
     _check(methods, draws, confidence, held)
     record = prepare(channel, forcing, held, window)
-    values, refusals, resampled = _attempted(record, methods, draws, confidence, seed)
+    values, refusals, resampled = _run_methods(record, methods, draws, confidence, seed)
     doubts = doubts_of(record, values, confidence)
     sign = record.signal.sign
     return ImpactEstimates(
@@ -111,7 +111,7 @@ def estimate_impacts(
     )
 
 
-def _attempted(
+def _run_methods(
     record: Prepared, methods: Sequence[str], draws: int, confidence: float, seed: int
 ) -> tuple[dict[str, Estimates], list[Refusal], Resampled | None]:
     """Return the estimates of each method, the refusals of the others, and the draws of the energy balance."""
@@ -230,11 +230,11 @@ def _trajectory_values(record: Prepared, confidence: float) -> Estimates:
 def _check_instants(method: str, record: Prepared) -> None:
     """Raise EstimationError if the instants of impact are too uncertain for speeds at the impacts."""
     fastest = max(record.parameters.angular_frequency, record.parameters.natural_frequency)
-    doubt = fastest * float(np.median([impact.time_error for impact in record.segmentation.impacts]))
-    if doubt > _INSTANT_DOUBT:
+    error = fastest * float(np.median([impact.time_error for impact in record.segmentation.impacts]))
+    if error > _INSTANT_ERROR:
         raise EstimationError(
-            f"{method}: expected instants of impact known to {_INSTANT_DOUBT} rad of the fastest motion, got "
-            f"{doubt:.2g}. Weak impacts in this noise have no certain speeds: use the weak form or the trajectories."
+            f"{method}: expected instants of impact known to {_INSTANT_ERROR} rad of the fastest motion, got "
+            f"{error:.2g}. Weak impacts in this noise have no certain speeds: use the weak form or the trajectories."
         )
 
 
@@ -259,7 +259,7 @@ def _energy_values(method: str, record: Prepared, resampled: Resampled, confiden
     # judged by the damping of the weak form: by its own damping, only chance excesses would pass
     if (
         damping is not None
-        and not resampled.parameters.damping_ratio > _CLEAR[method] * damping.standard_error
+        and not resampled.parameters.damping_ratio > _SEPARABLE[method] * damping.standard_error
     ):
         raise EstimationError(
             f"{method}: expected data that separate damping from restitution, got a damping ratio of "

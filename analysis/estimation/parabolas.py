@@ -22,7 +22,7 @@ _MOST_POINTS = 500
 # Smallest number of points in a piece: one more than the coefficients of a parabola.
 FEWEST_IN_PIECE = 4
 # Price of a piece, in variances of the noise: by chance, a second parabola saves more in 1 of 10,000 cases.
-_PRICE = 24.0
+_PIECE_PENALTY = 24.0
 # Factors of the noise for repeated cuts: coloured noise and contacts of some length look like more pieces.
 _FACTORS = (1.0, 2.0, 4.0, 8.0)
 # Smallest noise for a cut, relative to the range; below it sums of squares are rounded.
@@ -88,8 +88,8 @@ def cuts(points: Points, noise: float) -> list[list[Piece]]:
         return []
     least = _ROUNDING * float(np.ptp(points.values))
     variance = noise**2 / points.size + least**2
-    prices = _PRICE * variance * np.square(_FACTORS)
-    ends = [_walked(row, points.skipped) for row in _cheapest(points, prices)]
+    penalties = _PIECE_PENALTY * variance * np.square(_FACTORS)
+    ends = [_traced(row, points.skipped) for row in _cheapest(points, penalties)]
     different = [one for k, one in enumerate(ends) if one not in ends[:k]]
     return [[piece_of(points, first, end) for first, end in one] for one in different]
 
@@ -104,7 +104,7 @@ def piece_of(points: Points, first: int, end: int) -> Piece:
     return Piece(first, end, coefficients, middle, float(residual @ residual))
 
 
-def _walked(before: NDArray[np.intp], skipped: int) -> list[tuple[int, int]]:
+def _traced(before: NDArray[np.intp], skipped: int) -> list[tuple[int, int]]:
     """Return the start and end of each piece of a cut, followed backwards from the last end."""
     ends, end = [], len(before) - 1
     while end > 0:
@@ -114,17 +114,17 @@ def _walked(before: NDArray[np.intp], skipped: int) -> list[tuple[int, int]]:
     return ends[::-1]
 
 
-def _cheapest(points: Points, prices: Floats) -> NDArray[np.intp]:
+def _cheapest(points: Points, penalties: Floats) -> NDArray[np.intp]:
     """Return the start of the last piece in the cheapest cut up to each end, for each price."""
     count = len(points.time)
-    cost = np.full((len(prices), count + 1), np.inf)
+    cost = np.full((len(penalties), count + 1), np.inf)
     cost[:, 0] = 0.0
     before = np.zeros(cost.shape, dtype=np.intp)
     for start in range(count - FEWEST_IN_PIECE + 1):
         first = start + (points.skipped if start else 0)
         squares = _squares(points.time[first:], points.values[first:])
         ends = slice(first + FEWEST_IN_PIECE, count + 1)
-        trial = cost[:, start, None] + squares + prices[:, None]
+        trial = cost[:, start, None] + squares + penalties[:, None]
         cheaper = trial < cost[:, ends]
         cost[:, ends] = np.where(cheaper, trial, cost[:, ends])
         before[:, ends] = np.where(cheaper, start, before[:, ends])

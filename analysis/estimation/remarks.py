@@ -22,18 +22,18 @@ from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
 from vibroimpact.fmus.messages import Argument, message
 
 # Standard errors above which evidence against the model counts: chance exceeds them once in a thousand times.
-_CLEAR = 3.3
+_SIGNIFICANT = 3.3
 # Number of kinks the other way, and their share of the impacts, above which there is a second stop.
 _FEWEST_OPPOSITE, _PART_OPPOSITE = 3, 0.1
 # Shares of kinks away from the stop, and of unexplained flights, above which there is a doubt.
-_PART_STRAY = 0.15
+_PART_AWAY = 0.15
 _PART_UNEXPLAINED = 0.15
 # Noise, relative to the motion's range, below which it is the rounding of a simulation.
 _ROUNDING = 1e-6
 _FEWEST_IMPACTS = 5
 _FEWEST_SAMPLES = 12
 # Difference of two methods, in their joint standard errors, above which they contradict each other.
-_APART = 3.0
+_CONTRADICTION = 3.0
 # Relative standard error of a natural frequency above which stiffness, force and offset fit equally well along a
 # valley. In 300 records, 72 to 82 % of the intervals held the truth between .04 and .07, and 94 % below .03.
 _DETERMINED = 0.04
@@ -144,7 +144,7 @@ def _of_stops(record: Prepared) -> Iterator[Doubt]:
         yield Doubt(f"{cut.opposite} impacts turn the motion the other way: there is a second stop")
     if cut.passed:
         yield Doubt("the motion goes beyond the level of its impacts: they are not those of one stop")
-    if cut.stray > _PART_STRAY * (cut.stray + len(cut.impacts)):
+    if cut.stray > _PART_AWAY * (cut.stray + len(cut.impacts)):
         yield Doubt(
             f"{cut.stray} of {cut.stray + len(cut.impacts)} jumps of the velocity are not where the others are: "
             "the stop is not one place, or the channel is not the displacement of the contact"
@@ -178,19 +178,19 @@ def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
             "a sensor that filters, or motion that the model lacks"
         )
     slope, error = slope_of_restitution(record)
-    if abs(slope) > _CLEAR * error:
+    if abs(slope) > _SIGNIFICANT * error:
         yield Doubt(
             f"the restitution changes with the speed of impact ({slope:+.2g} +- {error:.1g} at double the typical "
             "speed), or friction does"
         )
     friction, error = dry_friction(record)
-    if abs(friction) > _CLEAR * error:
+    if abs(friction) > _SIGNIFICANT * error:
         yield Doubt(
             f"the flights show dry friction ({abs(friction):.2g} +- {error:.1g} over the stiffness), or other damping "
             "that is not viscous"
         )
     excess = excess_of_trajectories(record)
-    if excess > _CLEAR:
+    if excess > _SIGNIFICANT:
         yield Doubt(
             message(
                 f"trajectories through the impacts leave more than the flights between them, by {excess:.0f} standard "
@@ -198,7 +198,7 @@ def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
                 clocks,
             )
         )
-    if excess < -_CLEAR:
+    if excess < -_SIGNIFICANT:
         yield Doubt(
             f"the trajectories follow the flights better than the weak form does, by {-excess:.0f} standard errors",
             tuple(name for name in ANSWERING if name != "trajectory"),
@@ -229,17 +229,17 @@ def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
         apart = [
             name
             for name, one in values[method].items()
-            if name in values[best] and _apart(name, one, values[best][name], confidence)
+            if name in values[best] and _contradict(name, one, values[best][name], confidence)
         ]
         if apart:
-            said = " and ".join(name.replace("_", " ") for name in apart)
+            quantities = " and ".join(name.replace("_", " ") for name in apart)
             yield Doubt(
-                f"{method} and {best} contradict each other about {said}",
+                f"{method} and {best} contradict each other about {quantities}",
                 () if method == "weak_form" else (method,),
             )
 
 
-def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
+def _contradict(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
     """Tell whether two intervals are disjoint, by more than chance explains."""
     from scipy.stats import norm
 
@@ -248,7 +248,7 @@ def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: fl
     between = one.value - one.low, other.high - other.value
     if gap <= 0.0:
         between = one.high - one.value, other.value - other.low
-    reach = _APART / float(norm.ppf(0.5 + 0.5 * confidence)) * math.hypot(*between)
+    reach = _CONTRADICTION / float(norm.ppf(0.5 + 0.5 * confidence)) * math.hypot(*between)
     return abs(gap) > max(sum(between), reach)
 
 

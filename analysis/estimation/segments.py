@@ -38,9 +38,9 @@ _LEVEL_OF_SIZE = 0.02
 _SHORTER = 0.6
 _FEWEST_IN_WINDOW = 6
 # ... the shorter window is used if it shows more impacts by more than this factor.
-_MORE = 1.1
+_MORE_IMPACTS = 1.1
 # No shorter window is tried if all impacts are further apart than this many windows.
-_APART = 2.5
+_SEPARATE = 2.5
 # A kink the other way counts if it is further than this many windows from all kinks at the stop ...
 _CLEAR_OF = 1.1
 # ... and larger than this share of the largest kink there: smooth motion makes small kinks.
@@ -112,7 +112,7 @@ class Segmentation:
     @property
     def passed(self) -> bool:
         """Whether the motion passes the level of the kinks, so that no stop is there."""
-        return bool(self.impacts) and _goes_beyond(self.signal, self.stop_position)
+        return bool(self.impacts) and _exceeds_level(self.signal, self.stop_position)
 
 
 def segment_channel(channel: Channel, fastest: float, known: Known, window: float | None) -> Segmentation:
@@ -167,9 +167,9 @@ def segment(
             # a window that is too long shows kinks away from the impacts
             misplaced = misplaced or problem
             continue
-        if found is None or _better(trial, found):
+        if found is None or _is_better(trial, found):
             found = trial
-        if _uncrowded(trial, count) and not trial.passed:
+        if _are_separate(trial, count) and not trial.passed:
             break
     if misplaced is not None and (found is None or len(found.impacts) < _FEWEST_TO_CHECK):
         raise misplaced
@@ -191,23 +191,23 @@ def _counts(most: float) -> list[int]:
     return counts
 
 
-def _better(trial: Segmentation, found: Segmentation) -> bool:
+def _is_better(trial: Segmentation, found: Segmentation) -> bool:
     """Tell whether a shorter window shows more impacts, or shows a stop where the longer one does not."""
     if trial.passed != found.passed:
         return _is_stopped(trial)
-    return len(trial.impacts) > _MORE * len(found.impacts)
+    return len(trial.impacts) > _MORE_IMPACTS * len(found.impacts)
 
 
-def _goes_beyond(signal: Signal, level: float) -> bool:
+def _exceeds_level(signal: Signal, level: float) -> bool:
     """Tell whether more samples are above a level than a stop there allows, given noise and yielding of the stop."""
     limit = level + max(_BEYOND_OF_SIZE * 0.5 * signal.range, _JUMPS_BEYOND * signal.noise)
     return bool(np.mean(signal.values[signal.good] > limit) > _PART_BEYOND)
 
 
-def _uncrowded(cut: Segmentation, count: int) -> bool:
+def _are_separate(cut: Segmentation, count: int) -> bool:
     """Tell whether all impacts are so far apart that a shorter window would show no more."""
     apart = np.diff([impact.time for impact in cut.impacts])
-    return bool(len(apart) and not cut.stray and np.min(apart) > _APART * count * cut.signal.interval)
+    return bool(len(apart) and not cut.stray and np.min(apart) > _SEPARATE * count * cut.signal.interval)
 
 
 def _possible_cut(
@@ -458,12 +458,12 @@ def _flights(signal: Signal, impacts: list[Impact]) -> tuple[Flight, ...]:
     for k in range(len(impacts) - 1):
         start, end = impacts[k].time, impacts[k + 1].time
         # a sample this near an impact may belong to its other side
-        doubt = [DOUBTFUL * impact.time_error for impact in impacts[k : k + 2]]
-        first = int(np.searchsorted(signal.time, start + doubt[0], side="right"))
-        last = int(np.searchsorted(signal.time, end - doubt[1], side="left"))
+        margins = [DOUBTFUL * impact.time_error for impact in impacts[k : k + 2]]
+        first = int(np.searchsorted(signal.time, start + margins[0], side="right"))
+        last = int(np.searchsorted(signal.time, end - margins[1], side="left"))
         index = np.arange(first, last)
         index = index[signal.good[index]]
         # a gap leaves a flight that cannot be followed
-        usable = len(index) >= max(FEWEST_IN_FLIGHT, 0.8 * (end - start - sum(doubt)) / signal.interval - 2)
+        usable = len(index) >= max(FEWEST_IN_FLIGHT, 0.8 * (end - start - sum(margins)) / signal.interval - 2)
         flights.append(Flight(start, end, index, k, usable))
     return tuple(flights)

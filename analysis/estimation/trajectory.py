@@ -28,7 +28,7 @@ SPANS = (12, 6, 3, 1)
 MOST_IMPACTS = 60
 # Residual, over the noise of the single flights, above which a fit is inadequate, and above which it is refused.
 _ADEQUATE = 1.5
-_HOPELESS = 4.0
+_REFUSED = 4.0
 # Distance of the start from the samples, relative to the motion's size, above which no fit is tried.
 _NEAR = 0.1
 _STEP = 1e-7
@@ -37,10 +37,10 @@ _CHATTER = 1e-5
 _FEWEST_IN_HEAD = 5
 _MOST_TRIALS = 20
 # Residual, in ranges of the signal, assigned to a trial that is no oscillator.
-_FAR = 1e3
+_UNPHYSICAL_RESIDUAL = 1e3
 # Standard errors above the typical residual beyond which pieces are left out; largest share of pieces left out.
 _BEYOND_CHANCE = 5.0
-_MOST_ODD = 0.34
+_MOST_LEFT_OUT = 0.34
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,15 +233,15 @@ def fit_trajectory(
         if span > SPANS[-1] and problem.distance() > _NEAR * size:
             continue
         trial = problem.solve(noise)
-        odd = _misfits(signal, trial)
-        if odd and len(odd) <= _MOST_ODD * len(pieces):
-            kept = [piece for k, piece in enumerate(trial.pieces) if k not in odd]
+        outlying = _misfits(signal, trial)
+        if outlying and len(outlying) <= _MOST_LEFT_OUT * len(pieces):
+            kept = [piece for k, piece in enumerate(trial.pieces) if k not in outlying]
             trial = PathProblem(signal, kept, trial.parameters, tuple(free), size).solve(noise)
         if best is None or trial.noise < best.noise:
             best = trial
         if trial.adequate:
             return trial
-    if best is None or best.noise > _HOPELESS * noise + 1e-9 * size:
+    if best is None or best.noise > _REFUSED * noise + 1e-9 * size:
         residual = math.inf if best is None else best.noise
         raise EstimationError(
             f"trajectory: expected rests of the size of the noise ({noise:.3g}), got {residual:.3g}. The model of one "
@@ -307,7 +307,7 @@ class PathProblem:
         parameters = self.parameters(x)
         if parameters is None:
             # the large residual makes the search shorten its step
-            return np.full(self.rows[-1], _FAR * float(np.ptp(self.signal.values)))
+            return np.full(self.rows[-1], _UNPHYSICAL_RESIDUAL * float(np.ptp(self.signal.values)))
         pieces = [self.piece(x, k, parameters) for k in range(len(self.pieces))]
         return np.concatenate([residual_of(self.signal, piece, parameters) for piece in pieces])
 

@@ -37,9 +37,9 @@ _DEPENDENT = 1e-8
 # Singular value of the Jacobian, relative to the largest, below which the parameters are not separable.
 _SINGULAR = 1e-9
 # Probability of a larger misfit by noise alone, below which a flight does not follow the model.
-_SELDOM = 1e-4
+_REJECTION = 1e-4
 # Factor on the limit of the misfit, for the uncertainty of the noise variance.
-_NOISE_DOUBT = 1.2
+_NOISE_MARGIN = 1.2
 # Share of the flights dropped in a round, the worst, until all follow the model; smallest share that is kept.
 _LEFT_OUT = 0.25
 _FEWEST_KEPT = 0.2
@@ -107,8 +107,8 @@ def weighted_flights(signal: Signal, flights: Sequence[Flight], fastest: float) 
     found = []
     for flight in flights:
         if flight.usable:
-            wanted = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * flight.duration)
-            functions = max(2, min(wanted, len(flight.index) // _SAMPLES_PER_FUNCTION))
+            needed = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * flight.duration)
+            functions = max(2, min(needed, len(flight.index) // _SAMPLES_PER_FUNCTION))
             found.append(weighted(signal.time[flight.index], signal.values[flight.index], functions))
     return found
 
@@ -168,8 +168,8 @@ def _linear_system(
 def _from_linear(solution: Floats, known: Parameters, free: Sequence[str]) -> Parameters:
     """Return parameters from the solution of the linear system, whose unknowns are their coordinates."""
     # a free phase has two columns, for amplitude and phase
-    asked = {*free, "static_deflection"} if "phase" in free else set(free)
-    names = [name for name in _LINEAR if name in asked]
+    unknowns = {*free, "static_deflection"} if "phase" in free else set(free)
+    names = [name for name in _LINEAR if name in unknowns]
     found = Coordinates(tuple(names), known).parameters(solution)
     if found is None:
         square = dict(zip(names, solution, strict=True)).get("natural_frequency", known.natural_frequency**2)
@@ -260,7 +260,7 @@ def _misfit_limits(flights: Sequence[WeightedFlight]) -> Floats:
     from scipy.stats import chi2
 
     ranks = np.array([flight.weights.shape[1] for flight in flights])
-    limits: Floats = _NOISE_DOUBT * chi2.isf(_SELDOM, ranks) / ranks
+    limits: Floats = _NOISE_MARGIN * chi2.isf(_REJECTION, ranks) / ranks
     return limits
 
 

@@ -75,9 +75,9 @@ def laid_out(figure: Figure, title: str | None, width: float | None, height: flo
             old if given is None else given * _MM
             for given, old in zip((width, height), figure.get_size_inches(), strict=True)
         ]
-        asked = " x ".join(f"{inches / _MM:.4g}" for inches in size)
+        in_mm = " x ".join(f"{inches / _MM:.4g}" for inches in size)
         if not all(_SMALLEST <= inches / _MM <= _LARGEST for inches in size):
-            raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {asked} mm.")
+            raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {in_mm} mm.")
         figure.set_size_inches(size[0], size[1])
     if title or width is not None or height is not None:
         _refuse_undrawable(figure, title)

@@ -15,7 +15,7 @@ from vibroimpact.fmus.messages import Either, message, option_of
 #: Number of forcing periods drawn from a longer record; more would overlap in one column.
 SHOWN_PERIODS = 8
 # Share of a period by which rounding may lengthen whole periods.
-_SLACK = 1e-6
+_ROUNDING = 1e-6
 _FIRST, _LAST = (Either(name, option_of(name).removeprefix("--")) for name in ("start", "stop"))
 
 
@@ -87,7 +87,7 @@ class Window:
     def _ends(self, first: float, last: float, period: float | None) -> tuple[float, float]:
         length = (self.periods or SHOWN_PERIODS) * period if period is not None else math.inf
         if not self.given:
-            return first, first + (length if last - first > (1.0 + _SLACK) * length else last - first)
+            return first, first + (length if last - first > (1.0 + _ROUNDING) * length else last - first)
         start = first if self.start is None else self.start
         if self.periods is None:
             return start, last if self.stop is None else self.stop

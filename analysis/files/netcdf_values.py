@@ -17,7 +17,7 @@ def read(path: str, options: dict[str, Any]) -> tuple[None, tuple[()]]:
     HDF5 can take values from other files. If no other file can be opened, such values fail to read, or differ.
     """
     values = _netcdf_values(path, options["most_bytes"])
-    _let_open_one_more()
+    _limit_open_files()
     if _netcdf_values(path, options["most_bytes"]) != values:
         raise ValueError("it takes values from another file")
     return None, ()
@@ -42,7 +42,7 @@ def _netcdf_values(path: str, most: int) -> int:
         return found
 
 
-def _let_open_one_more() -> None:
+def _limit_open_files() -> None:
     """Limit this process to one more open file than it has now, where the system supports the limit."""
     if not hasattr(os, "fork"):
         return  # this process continues to read other files
@@ -61,14 +61,14 @@ def _size(variable: Any) -> int:
 def _read_values(variable: Any, found: int = 0) -> int:
     """Read all values, block by block; return the checksum `found` with them."""
     if not variable.shape or 0 in variable.shape:
-        return _with(found, variable[...])
+        return _checksum(found, variable[...])
     rows = max(1, BLOCK // math.prod(variable.shape[1:]))
     for first in range(0, variable.shape[0], rows):
-        found = _with(found, variable[first : first + rows])
+        found = _checksum(found, variable[first : first + rows])
     return found
 
 
-def _with(found: int, values: Any) -> int:
+def _checksum(found: int, values: Any) -> int:
     """Return a checksum continued by values; objects (texts) lie in the file itself, and are skipped."""
     block = getattr(values, "data", values)
     kind = getattr(getattr(values, "dtype", None), "kind", "O")

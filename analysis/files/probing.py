@@ -35,7 +35,7 @@ LONGEST_REASON = 300
 MOST_EXPANSION = 1100
 SPARSE_BYTES = 400_000_000
 #: Version of the check; contents found sound by an older version are checked again.
-LOOK = 2
+CHECK_VERSION = 2
 #: Largest number of contents remembered as sound.
 MOST_REMEMBERED = 4096
 READER = "vibroimpact.analysis.files.netcdf_values:read"
@@ -111,7 +111,7 @@ def _verdict(path: str, size: int) -> UnsoundFileError | None:
     if matches_recorded_hash(path):
         return None
     with open(path, "rb") as file:
-        content = f"NetCDF-{LOOK} {hashlib.file_digest(file, 'sha256').hexdigest()}"
+        content = f"NetCDF-{CHECK_VERSION} {hashlib.file_digest(file, 'sha256').hexdigest()}"
     if content not in _of_contents:
         _of_contents[content] = None if content in _remembered() else _probed(path, size)
         if _of_contents[content] is None:

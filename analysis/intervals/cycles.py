@@ -18,9 +18,9 @@ from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 LONGEST_CYCLE, FEWEST_REPEATS = 16, 4
 # Largest difference of equal intervals one cycle apart, in standard deviations of their cluster, and at most relative
 # to the median interval. The last number is the smallest share of equal intervals.
-SAME, AT_MOST, MOSTLY = 4.5, 0.1, 0.8
+LARGEST_DEVIATION, LARGEST_DIFFERENCE, LEAST_EQUAL = 4.5, 0.1, 0.8
 # Largest deviation of a cycle from a whole number of forcing periods.
-WHOLE = 0.1
+PERIOD_DEVIATION = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def _verdict(impacts: int, duration: float, forcing_period: float | None, how: s
         return Cycle(impacts, duration, 0, f"P({impacts},q), q needs the forcing period; {same}")
     ratio = duration / forcing_period
     periods = round(ratio)
-    if periods < 1 or abs(ratio - periods) > WHOLE:
+    if periods < 1 or abs(ratio - periods) > PERIOD_DEVIATION:
         words = (
             f"{same}; a cycle of {impacts} lasts {ratio:.3f} forcing periods, not a whole number of them: the "
             "response is not locked to that forcing, or spikes are missed"
@@ -86,7 +86,7 @@ def _tolerance(train: IntervalTrain) -> float:
     """Return the difference up to which two intervals are equal, s."""
     intervals = train.intervals
     typical = typical_interval(intervals)
-    scatter = min(SAME * spread_within(intervals), AT_MOST * typical)
+    scatter = min(LARGEST_DEVIATION * spread_within(intervals), LARGEST_DIFFERENCE * typical)
     return max(scatter, FINEST * typical, 2.1 * train.resolution)
 
 
@@ -99,6 +99,6 @@ def _repeats_after(intervals: Floats, tolerance: float) -> int:
         change = np.abs(intervals[count:] - intervals[:-count])
         known = change[np.isfinite(change)]
         whole = np.isfinite(np.lib.stride_tricks.sliding_window_view(intervals, count).sum(axis=1))
-        if len(known) and np.any(whole) and np.mean(known < tolerance) >= MOSTLY:
+        if len(known) and np.any(whole) and np.mean(known < tolerance) >= LEAST_EQUAL:
             return count
     return 0

@@ -38,14 +38,14 @@ REPEATS = 0.5
 # Growth of the slope per embedding below which it is constant. Ratio of its last value to the surrogate's above which
 # it keeps up, and above which it is steeper. Ratio of the surrogate's last value to that of noise below which the
 # surrogate flattens.
-STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
+CONSTANT, SIMILAR, STEEPER, FLATTER = 0.15, 0.85, 1.3, 0.75
 # Distance from its last value within which a slope has saturated.
-REACHED = 0.2
+SATURATION = 0.2
 # Smallest number of successive embeddings with a slope for a verdict.
 FEWEST_SLOPES = 3
 # Slope in the lower half of the window minus that in the upper half above which the intervals contain noise. Measured:
 # up to .09 without noise (Henon's and the logistic map, a torus); .3, .5, 1.4, 1.7 for Henon's with 1, 2, 5, 10 %.
-STEEPER = 0.25
+NOISE_SLOPE = 0.25
 # Slope up to which a stretch is a plateau, and smallest share of all pairs beyond it.
 FLAT, LEFT_OUT = 0.1, 0.1
 
@@ -151,14 +151,14 @@ def _verdict(slopes: Floats, surrogate: Floats, lowest: int) -> str:
     top, against, highest = slopes[-1], surrogate[-1], lowest + len(slopes) - 1
     numbers = f"{top:.2f} at m = {highest}, shuffled {against:.2f}"
     growth, expected = np.diff(slopes)[-2:].mean(), np.diff(surrogate)[-2:].mean()
-    if top > AHEAD * against:
+    if top > STEEPER * against:
         return f"no saturation: noise at these radii, about an ordered motion ({numbers})"
-    if against < FLATTENS * highest * min(surrogate[0] / lowest, 1.0) and top > KEEPS_UP * against:
+    if against < FLATTER * highest * min(surrogate[0] / lowest, 1.0) and top > SIMILAR * against:
         return f"flattens as its shuffled surrogate does ({numbers}): the distribution, not dynamics; no dimension"
-    if top > KEEPS_UP * against and growth > STILL:
+    if top > SIMILAR * against and growth > CONSTANT:
         return f"no saturation: noise-like, as its shuffled surrogate ({numbers})"
-    if growth < STILL * max(expected, 1.0):
-        first = int(np.argmax(slopes > top - max(REACHED, 0.1 * top))) + lowest
+    if growth < CONSTANT * max(expected, 1.0):
+        first = int(np.argmax(slopes > top - max(SATURATION, 0.1 * top))) + lowest
         return (
             f"saturation at {top:.2f} from m = {first} on, where the surrogate goes on to {against:.2f}: "
             "low-dimensional"
@@ -176,7 +176,7 @@ def _noise(sums: CorrelationSums, above: float) -> str:
     large = fitted_slopes(sums, above=above, window=(middle, high))[1:]
     steeper = np.nan_to_num(small - large, nan=0.0)
     place = int(np.argmax(steeper))
-    if steeper[place] < STEEPER:
+    if steeper[place] < NOISE_SLOPE:
         return ""
     return (
         f", but with noise in it: at m = {place + 2} the slope is {small[place]:.2f} for C up to {middle:g} and "

@@ -24,10 +24,10 @@ WINDOW = 41
 # limit, relative to the interval. A lattice beyond the upper limit is blurred.
 SIGMAS, NEAREST, FARTHEST = 5.0, 0.005, 0.2
 # Smallest share of all events on the lattice.
-MOSTLY = 0.7
+LEAST_ON_LATTICE = 0.7
 ROUNDS = 4
 # Longest span that sharpens the interval, in events; distance of its end from the lattice, relative to the interval.
-LONGEST_SPAN, HALF_WAY = 64, 0.25
+LONGEST_SPAN, NEAR_LATTICE = 64, 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +91,10 @@ def interval_lattice(train: IntervalTrain) -> Lattice:
             reason=f"no single lattice: events scatter by {100 * jitter:.0f} % of the most frequent interval "
             f"({interval:.4g} s) about its multiples; expected at most {100 * FARTHEST / SIGMAS:.0f} %"
         )
-    if np.mean(on_lattice) < MOSTLY:
+    if np.mean(on_lattice) < LEAST_ON_LATTICE:
         return Lattice(
             reason=f"no single lattice: {100 * np.mean(on_lattice):.0f} % of the events lie at multiples of the most "
-            f"frequent interval ({interval:.4g} s); expected at least {100 * MOSTLY:.0f} %",
+            f"frequent interval ({interval:.4g} s); expected at least {100 * LEAST_ON_LATTICE:.0f} %",
         )
     return _shares(train, interval, jitter, width, offset, on_lattice)
 
@@ -123,11 +123,11 @@ def _sharpened(times: Floats, guess: float) -> float:
     while reach <= min(LONGEST_SPAN, len(times) // 4):
         spans = times[reach:] - times[:-reach]
         number = np.rint(spans / interval)
-        beside = spans / interval - number
-        near = (np.abs(beside) < HALF_WAY) & (number > 0.0)
+        deviation = spans / interval - number
+        near = (np.abs(deviation) < NEAR_LATTICE) & (number > 0.0)
         if not near.any():
             break
-        interval *= 1.0 + float(np.median(beside[near] / number[near]))
+        interval *= 1.0 + float(np.median(deviation[near] / number[near]))
         reach *= 2
     return interval
 

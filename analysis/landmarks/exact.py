@@ -101,7 +101,7 @@ class ImpactOscillator:
         for velocity in sorted(float(root.real) for root in roots if root.imag == 0.0 and root.real > 0.0):
             y, v = a - alpha * velocity, slope * velocity
             theta = math.atan2(s * y - c * v, c * y + s * v)
-            if _clears_the_stop(self, w, velocity, theta):
+            if _stays_below(self, w, velocity, theta):
                 found.append((velocity * self.natural_frequency, theta % (2.0 * math.pi)))
         return tuple(found)
 
@@ -219,7 +219,7 @@ def _limits(oscillator: ImpactOscillator, low: float, high: float, sigma: float)
     for w in _roots(excess, np.linspace(low / scale, high / scale, _SCAN_POINTS)):
         velocity, cosine, sine = (float(value) for value in _locus(oscillator, np.float64(w), sigma))
         theta = math.atan2(sine, cosine) % (2 * math.pi)
-        if velocity > 0 and _clears_the_stop(oscillator, w, velocity, theta):
+        if velocity > 0 and _stays_below(oscillator, w, velocity, theta):
             limits.append(StabilityLimit(w * scale, velocity * scale, theta))
     return limits
 
@@ -273,7 +273,7 @@ def _locus(oscillator: ImpactOscillator, w: Any, sigma: float) -> tuple[Any, Any
     return velocity, in_phase, quadrature
 
 
-def _clears_the_stop(oscillator: ImpactOscillator, w: float, velocity: float, theta: float) -> bool:
+def _stays_below(oscillator: ImpactOscillator, w: float, velocity: float, theta: float) -> bool:
     """Tell whether the flight between two impacts stays below the stop, certified by a bound on acceleration.
 
     At both ends the flight leaves the stop with a known speed. In between, the largest sample plus the largest

@@ -114,10 +114,10 @@ def bifurcation_readings(dataset: xr.Dataset) -> list[Reading]:
 def _scene(dataset: xr.Dataset) -> str:
     """Return the scene text of an up-down frequency sweep; another dataset raises DatasetError."""
     needed = ("impact_count", "impact_velocity", "displacement_max", "impacts_per_period")
-    lacking = [name for name in needed if name not in dataset.variables]
-    if lacking:
+    missing = [name for name in needed if name not in dataset.variables]
+    if missing:
         raise DatasetError(
-            f"readings: expected impacts and extrema in the dataset, got no {', '.join(lacking)}. "
+            f"readings: expected impacts and extrema in the dataset, got no {', '.join(missing)}. "
             "Set impacts = true and extrema = true in [record]."
         )
     dims = dataset["impact_count"].dims

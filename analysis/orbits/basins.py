@@ -39,7 +39,7 @@ CHAOS_SAMPLE = 256
 """Number of the last starts that must all be chaotic for the others to count as chaotic."""
 ROUNDS = (24, 32, 48, 96, 200, 400, 800)
 """Forcing periods between two checks of the starts."""
-LOOKS = (104, 400)
+SEARCH_PERIODS = (104, 400)
 """Forcing periods after which attractors are searched again."""
 NEAREST, FARTHEST = 1e-7, 1e-2
 """Smallest and largest distance from an attractor, over the size of the motion, to try as the limit of near."""
@@ -197,7 +197,7 @@ class _Search:
 
     def blocks(self) -> Generator[Basins, None, None]:
         """Follow block after block."""
-        self._look(self._left(), FIRST_SAMPLE, first=True)
+        self._find_attractors(self._left(), FIRST_SAMPLE, first=True)
         yield self._basins
         passed = 0
         for periods in ROUNDS:
@@ -207,13 +207,13 @@ class _Search:
                 self._follow(places, periods, first=passed == 0)
                 yield self._basins
             passed += periods
-            if passed in LOOKS:
-                self._look(self._left(), LATER_SAMPLE)
+            if passed in SEARCH_PERIODS:
+                self._find_attractors(self._left(), LATER_SAMPLE)
                 self._match(self._left())
-                self._take_for_chaos()
-        self._look(self._left(), CHAOS_SAMPLE)
+                self._label_chaos()
+        self._find_attractors(self._left(), CHAOS_SAMPLE)
         self._match(self._left())
-        self._take_for_chaos()
+        self._label_chaos()
 
     def _left(self) -> NDArray[np.int64]:
         return np.flatnonzero((self._basins.labels == UNDECIDED) & ~self._lost)
@@ -243,7 +243,7 @@ class _Search:
 
     # ---- attractors ----
 
-    def _look(self, places: NDArray[np.int64], most: int, *, first: bool = False) -> None:
+    def _find_attractors(self, places: NDArray[np.int64], most: int, *, first: bool = False) -> None:
         """Find the attractors of some of these starts."""
         if not places.size:
             return
@@ -308,7 +308,7 @@ class _Search:
 
     # ---- chaos ----
 
-    def _take_for_chaos(self) -> None:
+    def _label_chaos(self) -> None:
         """Label the undecided starts as chaotic if all of a sample of them are."""
         chaotic = [n for n, each in enumerate(self._basins.attractors) if each.is_chaotic]
         left = self._left()
@@ -318,11 +318,11 @@ class _Search:
         kinds, states = self._flow.classes(self._now[chosen], TRANSIENT_OF_CHAOS)
         is_chaos = np.array([kind.kind is OrbitClass.chaos for kind in kinds])
         if is_chaos.all():
-            self._share_out(left, chosen, states, chaotic[0])
+            self._assign(left, chosen, states, chaotic[0])
         elif left.size <= CHAOS_SAMPLE and is_chaos.any():
-            self._share_out(chosen[is_chaos], chosen[is_chaos], states[is_chaos], chaotic[0])
+            self._assign(chosen[is_chaos], chosen[is_chaos], states[is_chaos], chaotic[0])
 
-    def _share_out(
+    def _assign(
         self, places: NDArray[np.int64], chosen: NDArray[np.int64], states: Floats, first: int
     ) -> None:
         """Assign chaotic starts to attractors, separated by long runs of the chosen starts from the given states."""
@@ -330,7 +330,7 @@ class _Search:
         own = self._grouped(self._flow.measure(states, BLOCK, BLOCKS).features, first)
         labels = np.zeros(self._basins.labels.size, np.int64)
         if len(self._numbers) > 1 and places.size > chosen.size:
-            labels[places] = self._told_by_blocks(places)
+            labels[places] = self._groups_by_blocks(places)
             if float((labels[chosen] == own).mean()) < LEAST_AGREEING:
                 if are_new:
                     self._merge(first)
@@ -375,7 +375,7 @@ class _Search:
         means = self._groups.means
         return means.reshape(len(means), -1, len(Feature))[..., Feature.impacts]
 
-    def _told_by_blocks(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _groups_by_blocks(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the group of each start by its own impacts; -1 if it fits no group in the allowed blocks."""
         labels = np.full(places.size, -1, np.int64)
         for _ in range(MOST_BLOCKS):

@@ -20,14 +20,14 @@ BLOCK, BLOCKS = 32, 64
 """Forcing periods of a block, and blocks of a run, for the separation of attractors."""
 BATCH = 8
 """Blocks of a batch: batches of one run count as independent of each other."""
-APART = 3.0
+SEPARATION = 3.0
 """Distance of the means of two runs, over the sum of their standard deviations, above which they may be apart."""
-UNLIKE = 4.0
+DIFFERENT = 4.0
 """Variance of the means of runs, over the variance that their batches explain, above which runs are not alike. One
 attractor with chatter and rests (damping ratio .01, restitution .8, angular frequency 2.9, stop at 0) has 1.9."""
 SLOW = 0.01
 """Speed of an impact, over the fastest of its block, below which it does not count: chatter has any number of them."""
-WITHIN = 5.0
+MEMBER = 5.0
 """Standard deviations from the mean of a group within which a block may belong to it."""
 MOST_BLOCKS = 16
 """Number of blocks after which a start that fits no group stays undecided."""
@@ -119,7 +119,7 @@ class Groups:
                 if one != other:
                     gaps = np.abs(self.means[one] - self.means[other])
                     best = int(np.argmax(gaps / (self.spreads[one] + self.spreads[other])))
-                    fits[:, one] &= (off[:, one, best] < off[:, other, best]) & (off[:, one, best] <= WITHIN)
+                    fits[:, one] &= (off[:, one, best] < off[:, other, best]) & (off[:, one, best] <= MEMBER)
         found = np.where(fits.any(axis=1), fits.argmax(axis=1), -1)
         return np.asarray(found, dtype=np.int64)
 
@@ -144,7 +144,7 @@ def grouped(features: Floats) -> Groups:
     kinds = range(int(labels.max(initial=0)) + 1)
     means = np.array([flat[labels == kind].mean(axis=(0, 1)) for kind in kinds])
     spreads = np.array([flat[labels == kind].std(axis=(0, 1)) for kind in kinds])
-    alike = all(_is_alike(flat[labels == kind], rounding) for kind in kinds)
+    alike = all(_are_equal(flat[labels == kind], rounding) for kind in kinds)
     return Groups(labels, means, spreads + rounding, alike)
 
 
@@ -161,7 +161,7 @@ def _linked(flat: Floats, rounding: Floats) -> NDArray[np.bool_]:
     for feature in range(flat.shape[2]):
         below = high[:, None, feature] < low[None, :, feature]
         gap = np.abs(mean[:, None, feature] - mean[None, :, feature])
-        far = gap > APART * (spread[:, None, feature] + spread[None, :, feature])
+        far = gap > SEPARATION * (spread[:, None, feature] + spread[None, :, feature])
         linked &= ~((below | below.T) & far)
     return linked
 
@@ -181,7 +181,7 @@ def _components(linked: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.asarray(np.argsort(order)[labels], dtype=np.int64)
 
 
-def _is_alike(flat: Floats, rounding: Floats) -> bool:
+def _are_equal(flat: Floats, rounding: Floats) -> bool:
     """Tell whether the means of runs differ by no more than the batches of their blocks explain.
 
     Numbers of impacts do not count: they come in bursts in chatter, and velocities carry the same information.
@@ -195,4 +195,4 @@ def _is_alike(flat: Floats, rounding: Floats) -> bool:
     rounding = np.delete(rounding, np.s_[Feature.impacts :: len(Feature)])
     between = means.mean(axis=1).var(axis=0, ddof=1)
     within = means.var(axis=1, ddof=1).mean(axis=0) / batches
-    return bool((between <= UNLIKE * within + (rounding / blocks) ** 2).all())
+    return bool((between <= DIFFERENT * within + (rounding / blocks) ** 2).all())

@@ -46,9 +46,9 @@ LEAST_DECAY = 1e-4
 """Smallest relative decrease of the distances in a turn that reveals a transient."""
 FEWEST, FEWEST_OF_CHAOS = 6, 40
 """Recorded periods below which the class is unknown, and below which no run is called chaos."""
-GROWTH, AHEAD = 0.05, 6
+GROWTH, PERIODS_AHEAD = 0.05, 6
 """Rate, 1 / period, above which the separation of neighbouring states is chaos; number of periods ahead."""
-FALLS = 5.0
+LEAST_FALL = 5.0
 """Fall of the distance of two rounds over a run, over a round's change, above which the rounds may be equal."""
 _MOST_SHOWN = 6
 """Largest number of classes listed in one line."""
@@ -109,8 +109,8 @@ class ClassesOfRuns(list[RunClass]):
 
     def __repr__(self) -> str:
         counts = Counter(each.name for each in self).most_common(_MOST_SHOWN + 1)
-        told = [f"{count} {name}" for name, count in counts[:_MOST_SHOWN]]
-        return f"<classes of {len(self)} runs: {', '.join(told + ['...'] * (len(counts) > _MOST_SHOWN))}>"
+        listed = [f"{count} {name}" for name, count in counts[:_MOST_SHOWN]]
+        return f"<classes of {len(self)} runs: {', '.join(listed + ['...'] * (len(counts) > _MOST_SHOWN))}>"
 
     def _repr_html_(self) -> str:
         counts = Counter((each.name, each.reason) for each in self).most_common()
@@ -357,7 +357,7 @@ def _closes(states: Floats, half: int) -> bool:
         return False
     parts = np.array_split(distances, 4)
     falls = all(float(late.mean()) < float(early.mean()) for early, late in itertools.pairwise(parts))
-    return falls and float(distances[0] - distances[-1]) > FALLS * change
+    return falls and float(distances[0] - distances[-1]) > LEAST_FALL * change
 
 
 def _goes_to_zero(before: Floats, after: Floats) -> bool:
@@ -388,11 +388,11 @@ def _dies_away(distances: Floats) -> bool:
 
 def _growth(states: Floats) -> float:
     """Return the mean rate at which neighbouring states separate, 1 / period (Rosenstein's estimate)."""
-    count = len(states) - AHEAD
+    count = len(states) - PERIODS_AHEAD
     apart = np.abs(states[:count, None] - states[None, :count]).max(axis=2)
     np.fill_diagonal(apart, np.inf)
     nearest = apart.argmin(axis=1)
     now = apart[np.arange(count), nearest]
-    later = np.abs(states[AHEAD:] - states[nearest + AHEAD]).max(axis=1)
-    told = (now > 0.0) & (later > 0.0)
-    return float(np.mean(np.log(later[told] / now[told]))) / AHEAD if told.any() else 0.0
+    later = np.abs(states[PERIODS_AHEAD:] - states[nearest + PERIODS_AHEAD]).max(axis=1)
+    separate = (now > 0.0) & (later > 0.0)
+    return float(np.mean(np.log(later[separate] / now[separate]))) / PERIODS_AHEAD if separate.any() else 0.0

@@ -112,8 +112,8 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     per_impact = sums.sum(axis=0) / counted
     means = sums / np.diff(edges)[:, None]
     order = np.argsort(-per_impact, kind="stable")
-    lost = [body.contacts[each].restitution for each in impacts.contacts[first:]]
-    exact = 2.0 * float(np.mean(np.log(lost))) - 2.0 * interval * float(
+    restitutions = [body.contacts[each].restitution for each in impacts.contacts[first:]]
+    exact = 2.0 * float(np.mean(np.log(restitutions))) - 2.0 * interval * float(
         (body.damping_ratios * body.frequencies).sum()
     )
     off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))

@@ -77,12 +77,12 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
             ],
         ]
     )
-    pushed = _pushed(natural, decay, force / amplitude, w, phase, length)
+    pushed = _forced(natural, decay, force / amplitude, w, phase, length)
     response = np.array([-pushed[0] / speed, pushed[1] - before * pushed[0] / speed])
     return ImpactMap(jacobian, response)
 
 
-def _pushed(natural: float, decay: float, force: float, w: float, phase: float, length: float) -> Floats:
+def _forced(natural: float, decay: float, force: float, w: float, phase: float, length: float) -> Floats:
     """Return displacement and velocity after `length` s from rest, under force cos(w t + phase)."""
     from scipy.linalg import expm
 

@@ -205,7 +205,7 @@ class Follower:
     def walk(self, branch: Branch, orbit: PeriodicOrbit, value: float, sign: float) -> Iterator[BranchOrbit]:
         """Follow one way, at first towards higher (+1) or lower (-1) values; the branch grows with each orbit."""
         start = self._first(orbit, value, sign)
-        yield from self._walked(branch, start)
+        yield from self._orbits(branch, start)
 
     def leave(self, branch: Branch, doubling: SpecialPoint) -> Iterator[BranchOrbit]:
         """Follow the orbits of twice the period that begin at a period doubling; the branch grows with each."""
@@ -220,7 +220,7 @@ class Follower:
         half = 0.5 * (away[: once.phases.size] - away[once.phases.size :])
         tangent = np.append(np.concatenate([half, -half]), 0.0)
         start = BranchOrbit(doubling.at.value, twice, tangent / np.linalg.norm(tangent))
-        yield from self._walked(branch, start, born=True)
+        yield from self._orbits(branch, start, born=True)
 
     def _first(self, orbit: PeriodicOrbit, value: float, sign: float) -> BranchOrbit:
         tangent = self._tangent(orbit, value, None)
@@ -228,7 +228,7 @@ class Follower:
             tangent = -tangent
         return BranchOrbit(value, orbit, tangent)
 
-    def _walked(self, branch: Branch, start: BranchOrbit, *, born: bool = False) -> Iterator[BranchOrbit]:
+    def _orbits(self, branch: Branch, start: BranchOrbit, *, born: bool = False) -> Iterator[BranchOrbit]:
         now, step, longest = start, 0.1 * self.settings.longest, self.settings.longest
         if not born:
             branch.orbits.append(now)
@@ -247,7 +247,7 @@ class Follower:
                 branch.orbits.append(taken)
                 yield taken
                 continue
-            home = self._home(branch.orbits[0], now, taken)
+            home = self._closing_step(branch.orbits[0], now, taken)
             if home is not None:
                 step, taken = home
             if (yield from self._passed(branch, now, taken, step)):
@@ -337,27 +337,27 @@ class Follower:
             return None
         return BranchOrbit(float(value), orbit, tangent), newton
 
-    def _home(
+    def _closing_step(
         self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit
     ) -> tuple[float, BranchOrbit] | None:
         """Return the step to the first orbit of the branch, and that orbit; None unless a step passes it."""
         if now is first or taken is first:
             return None
-        before, beyond = (self._apart(first, each) for each in (now, taken))
+        before, beyond = (self._difference(first, each) for each in (now, taken))
         if not first.tangent @ before < 0.0 <= first.tangent @ beyond:
             return None
         farther = max(float(np.linalg.norm(each)) for each in (before, beyond))
         if farther > 2.0 * float(np.linalg.norm(beyond - before)):
             return None  # another part of the branch passes the same plane
-        step = float(now.tangent @ self._apart(now, first))
+        step = float(now.tangent @ self._difference(now, first))
         found = self._step(now, step) if step > 0.0 else None
         return None if found is None else (step, found[0])
 
-    def _apart(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
+    def _difference(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
         """Return the difference of two orbits in the unknowns of the branch, whatever turn their phases start from."""
         whole = TURN * one.orbit.periods
         turned = [
-            np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _alike(one, other)
+            np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _shifts(one, other)
         ]
         apart = [each - one.orbit.phases for each in turned]
         apart = [each - TURN * np.round(each.mean() / TURN) for each in apart]
@@ -418,12 +418,12 @@ class Follower:
         """Return the place along a step where a test is 0, and the orbit there."""
         from scipy.optimize import brentq
 
-        lost = []
+        missing = []
 
         def at(part: float) -> float:
             found = (now, 0) if part == 0.0 else self._step(now, part)
             if found is None:
-                lost.append(part)
+                missing.append(part)
                 return float(np.nan)
             return test(found[0])
 
@@ -431,7 +431,7 @@ class Follower:
             part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
         except (ValueError, RuntimeError):
             return None
-        found = self._step(now, part) if part > 0.0 and not lost else None
+        found = self._step(now, part) if part > 0.0 and not missing else None
         return None if found is None else (part, found[0])
 
 
@@ -476,7 +476,7 @@ def joined(backward: Branch, forward: Branch) -> Branch:
     return Branch(forward.origin, turned + forward.orbits[1:], points, backward.ends + forward.ends)
 
 
-def _alike(one: BranchOrbit, other: BranchOrbit) -> list[int]:
+def _shifts(one: BranchOrbit, other: BranchOrbit) -> list[int]:
     """Return the shifts of an orbit's impacts for which its stops are in the order of another orbit."""
     contacts = other.orbit.contacts
     return [k for k in range(contacts.size) if (np.roll(contacts, -k) == one.orbit.contacts).all()]

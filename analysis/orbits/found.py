@@ -52,10 +52,10 @@ class FoundOrbits(list[PeriodicOrbit]):
 
     def _repr_html_(self) -> str:
         headings = ("orbit", "", "phases, rad", "stops", "impact velocities", "largest multiplier")
-        return html_table("Periodic orbits", headings, [_told(orbit) for orbit in self])
+        return html_table("Periodic orbits", headings, [_row(orbit) for orbit in self])
 
 
-def _told(orbit: PeriodicOrbit) -> tuple[object, ...]:
+def _row(orbit: PeriodicOrbit) -> tuple[object, ...]:
     largest = orbit.multipliers[0]
     return (
         orbit.name,

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 FREQUENCY = "angular_frequency"
 """Ending of the name of a forcing frequency."""
-ALIVE = 1e-2
+LEAST_SPEED = 1e-2
 """Speed of the last impacts, over the fastest, below which a motion without forcing dies away."""
 
 
@@ -55,8 +55,8 @@ def states_of_periods(impacts: xr.Dataset, frequency: float) -> tuple[Floats, Fl
         rows = np.flatnonzero(period == each)
         strongest = rows[np.argmax(speed[rows])] if rows.size else None
         states.append((0.0, 0.0) if strongest is None else (turns[strongest] - each, speed[strongest]))
-        rests = (impacts["impact_restitution"].values[rows] == 0.0).any()
-        counts.append(np.inf if rests else float(rows.size))
+        sticks = (impacts["impact_restitution"].values[rows] == 0.0).any()
+        counts.append(np.inf if sticks else float(rows.size))
     return np.array(states, dtype=float).reshape(-1, 2), np.array(counts, dtype=float)
 
 
@@ -71,7 +71,7 @@ def _cut(phases: Floats) -> float:
 def own_period(impacts: xr.Dataset, same: float) -> tuple[int, str]:
     """Return the number of impacts after which a motion without forcing repeats, or 0, and the reason for 0."""
     speed = impacts["impact_velocity"].values
-    if speed[-1] <= ALIVE * speed.max() or (impacts["impact_restitution"].values == 0.0).any():
+    if speed[-1] <= LEAST_SPEED * speed.max() or (impacts["impact_restitution"].values == 0.0).any():
         return 0, "no forcing, and its impacts die away"
     time = impacts["impact_time"].values
     rows = np.column_stack([np.diff(time), speed[1:], impacts["impact_contact"].values[1:]])

@@ -125,7 +125,7 @@ class LocusFollower:
             if found is None:
                 step *= 0.5
                 if step < SHORTEST * longest:
-                    locus.ends.append(self._why_no_further(locus, now, 1e-3 * longest))
+                    locus.ends.append(self._reason_for_end(locus, now, 1e-3 * longest))
                     return
                 continue
             taken, newton = found
@@ -242,7 +242,7 @@ class LocusFollower:
             return "graze between impacts", touch
         return None
 
-    def _why_no_further(self, locus: Locus, now: LocusPoint, step: float) -> str:
+    def _reason_for_end(self, locus: Locus, now: LocusPoint, step: float) -> str:
         """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
         if locus.kind != "graze between impacts":
             return "cannot be followed further"

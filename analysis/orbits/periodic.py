@@ -116,9 +116,9 @@ class PeriodicOrbit:
     def exact_determinant(self) -> float:
         """Product of restitutions squared and of the decay of all modes over the orbit: equations.md 4.2."""
         body = self.body
-        lost = np.prod([body.contacts[each].restitution ** 2 for each in self.contacts])
+        squared = np.prod([body.contacts[each].restitution ** 2 for each in self.contacts])
         decay = float((body.damping_ratios * body.frequencies).sum())
-        return float(lost * np.exp(-2.0 * self.periods * body.period * decay))
+        return float(squared * np.exp(-2.0 * self.periods * body.period * decay))
 
     @property
     def is_stable(self) -> bool:
@@ -221,7 +221,7 @@ def find_orbit(
     for _ in range(MOST_STEPS):
         error = float(np.abs(found.distances).max())
         step = np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0].astype(np.float64)
-        nearer = _nearer(body, hit, at, shortened(step, at, periods), periods, error)
+        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, error)
         if nearer is None:
             break
         at, found = nearer
@@ -236,7 +236,7 @@ def find_orbit(
     )
 
 
-def _nearer(
+def _damped_step(
     body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, step: Floats, periods: int, error: float
 ) -> tuple[Floats, Evaluation] | None:
     """Return phases nearer to an orbit, a part of a step away; None if there are none."""

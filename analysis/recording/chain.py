@@ -45,8 +45,8 @@ def chain_of(attributes: Mapping[Any, Any], runs: Any, row: int) -> ChannelChain
         return ChannelChain()
 
     def number(name: str) -> float:
-        told = attributes[name]
-        return float(runs[told].values[row] if isinstance(told, str) else told)
+        entry = attributes[name]
+        return float(runs[entry].values[row] if isinstance(entry, str) else entry)
 
     known = {name: number(name) for name in NUMBERS if name in attributes}
     if isinstance(attributes.get("skew"), str):  # a swept skew counts from channel to channel

@@ -247,8 +247,8 @@ class Recording:
 
 def _chosen(found: Mapping[str, T], name: str | None, what: str, title: str) -> T:
     if not found:
-        wanted = "one" if name is None else f'"{name}"'
-        raise DatasetError(f"{title}: {what}: expected {wanted}, got a file without any.")
+        expected = "one" if name is None else f'"{name}"'
+        raise DatasetError(f"{title}: {what}: expected {expected}, got a file without any.")
     names = ", ".join(found)
     if name is None:
         if len(found) == 1:

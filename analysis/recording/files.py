@@ -185,10 +185,8 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
     channels: dict[str, Channel] = {}
     events: dict[str, EventTrain] = {}
     scalars: dict[str, SingleValue] = {}
-    wanted = str(getattr(file, "variable_order", "")).split()
-    for name in sorted(
-        file.variables, key=lambda name: wanted.index(name) if name in wanted else len(wanted)
-    ):
+    order = str(getattr(file, "variable_order", "")).split()
+    for name in sorted(file.variables, key=lambda name: order.index(name) if name in order else len(order)):
         variable = file.variables[name]
         if name in axes or (
             name.endswith(QUALITY_ENDING) and name.removesuffix(QUALITY_ENDING) in file.variables

@@ -273,23 +273,23 @@ def align(
         (
             *_rival_remarks(start, best, others, "the other polarity"),
             *_rival_remarks(start, best, shifted, "the same polarity"),
-            *_doubts(best, at_bound),
+            *_warnings(best, at_bound),
         ),
     )
 
 
-def _doubts(best: _Peak, at_bound: bool) -> list[str]:
-    said = []
+def _warnings(best: _Peak, at_bound: bool) -> list[str]:
+    found = []
     if at_bound:
-        said.append(
+        found.append(
             f"the best lag is the largest allowed, {1e3 * best.lag:.4g} ms: the true one may be beyond"
         )
     if best.height < POOR_CORRELATION:
-        said.append(
+        found.append(
             f"at the start of the event the correlation of simulated and measured is {best.height:.2f} only: "
             "do not rely on lag and polarity"
         )
-    return said
+    return found
 
 
 def _start_of_event(

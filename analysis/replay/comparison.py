@@ -220,27 +220,27 @@ def compare(
         lag=lag,
         event=event,
     )
-    brought = _brought(simulated_time, simulated, measured, alignment)
-    scored = measured.good & np.isfinite(brought)
-    removed = _offset(offset, event, values[scored], brought[scored])
+    shifted = _shifted(simulated_time, simulated, measured, alignment)
+    scored = measured.good & np.isfinite(shifted)
+    removed = _offset(offset, event, values[scored], shifted[scored])
     values = values - removed
     peaks = None
     if peak_window is not None:
         # heights count from the rest value: 0 if the offset before the event was removed, otherwise the mean
         level = 0.0 if offset == "before" and event.quiet is not None else float(np.mean(values[scored]))
-        peaks = compare_peaks(time - event.onset, values, brought, scored, peak_window, event.period, level)
+        peaks = compare_peaks(time - event.onset, values, shifted, scored, peak_window, event.period, level)
     stretch = float(time[-1]) - event.onset
     length = max(stretch / RUNNING_WINDOWS, RUNNING_PERIODS * event.period)
     return Comparison(
         measured=measured,
         simulated_name=simulated_name,
         values=values,
-        simulated=brought,
+        simulated=shifted,
         scored=scored,
         event=event,
         offset=removed,
         alignment=alignment,
-        variance=variance_accounted_for(values, brought, scored),
+        variance=variance_accounted_for(values, shifted, scored),
         windows=list(windows),
         # the last sample is within the last window
         running=running_windows(0.0, stretch * (1.0 + 1e-9), length),
@@ -250,7 +250,7 @@ def compare(
     )
 
 
-def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, alignment: Alignment) -> Floats:
+def _shifted(simulated_time: Floats, simulated: Floats, measured: Channel, alignment: Alignment) -> Floats:
     """Return the simulated signal at the measured instants, NaN without a simulated value."""
     model = Interpolated(simulated_time, simulated)
     at = measured.time - alignment.lag
@@ -266,9 +266,9 @@ def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, align
     return np.where(inside, alignment.polarity * model(at), np.nan)
 
 
-def _offset(offset: str | float, event: ChannelEvent, values: Floats, brought: Floats) -> float:
+def _offset(offset: str | float, event: ChannelEvent, values: Floats, shifted: Floats) -> float:
     if offset == "level":
-        return float(np.mean(values) - np.mean(brought))
+        return float(np.mean(values) - np.mean(shifted))
     return {"before": event.offset, "none": 0.0}[offset] if isinstance(offset, str) else float(offset)
 
 
@@ -283,23 +283,23 @@ def _matched(
 
 def _remarks(measured: Channel, event: ChannelEvent, offset: str | float, scored: Flags) -> list[str]:
     """Return remarks on the parts of the record that were not scored, and on unknown quantities."""
-    said = []
+    found = []
     if event.quiet is None and offset == "before":
-        said.append(
+        found.append(
             "the recording does not begin quietly (a continuous signal, or noise only): its offset could not be "
             "estimated and was left, and the start of the record stands for the onset of the event"
         )
     good, done = int(np.count_nonzero(measured.good)), int(np.count_nonzero(scored))
     if done < good:
-        said.append(f"{good - done} good samples lie outside the simulated time and are not scored")
+        found.append(f"{good - done} good samples lie outside the simulated time and are not scored")
     if good < len(scored):
-        said.append(f"{len(scored) - good} samples are clipped, missing or out of range and are not scored")
+        found.append(f"{len(scored) - good} samples are clipped, missing or out of range and are not scored")
     if measured.axis.interval_uncertainty > 0.0:
-        said.append(
+        found.append(
             f"the sampling interval is uncertain by {100 * measured.axis.interval_uncertainty:.2g} %: so is "
             "every frequency"
         )
-    return said
+    return found
 
 
 def naive_variance(
@@ -327,9 +327,9 @@ def naive_variance(
     """
     found = align(drive_time, drive, measured, most_lag=most_lag, lag=lag, event_window=event_window)
     good = measured.good
-    brought = Interpolated(drive_time, drive)(measured.time[good] - found.lag)
-    brought = brought - np.mean(brought)
+    shifted = Interpolated(drive_time, drive)(measured.time[good] - found.lag)
+    shifted = shifted - np.mean(shifted)
     values = measured.si()[good]
     values = values - np.mean(values)
-    size = float(np.sum(brought**2) * np.sum(values**2))
-    return 100.0 * float(np.sum(brought * values)) ** 2 / size if size > 0.0 else 0.0
+    size = float(np.sum(shifted**2) * np.sum(values**2))
+    return 100.0 * float(np.sum(shifted * values)) ** 2 / size if size > 0.0 else 0.0

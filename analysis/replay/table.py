@@ -107,9 +107,9 @@ _ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
 
 def _add_windows(rows: Table, comparisons: Sequence[Comparison]) -> None:
     """Add a row for each window: requested windows first, then running windows, in ms from the onset."""
-    asked = [dict(zip(c.windows, c.window_variance, strict=True)) for c in comparisons]
+    requested = [dict(zip(c.windows, c.window_variance, strict=True)) for c in comparisons]
     running = [dict(zip(c.running, c.running_variance, strict=True)) for c in comparisons]
-    for heading, scored in (("window", asked), ("running", running)):
+    for heading, scored in (("window", requested), ("running", running)):
         spans = sorted({span for scores in scored for span in scores})
         if len(spans) > _MOST_WINDOWS:
             # the windows of the channels differ; the dataset and the figure have them

@@ -99,21 +99,21 @@ def trust(
         *_skill(scored or fitted, baseline or {}),
     ]
     if not scored:
-        lacking = "that it was not fitted on: give one to be scored, or fit on a part"
-        reasons.append(f"there is no record with an event {lacking if fitted else 'to be scored'}")
+        missing = "that it was not fitted on: give one to be scored, or fit on a part"
+        reasons.append(f"there is no record with an event {missing if fitted else 'to be scored'}")
     judged = {name: span for name, span in (held or {}).items() if name in scored or name in fitted}
-    beside = (*_breaks(judged, most_error, trusted=not reasons), *_loss(fitted, scored))
+    further = (*_breaks(judged, most_error, trusted=not reasons), *_loss(fitted, scored))
     replay = "linear replay" if linear else "replay"
     if reasons:
-        return Verdict(f"Do not trust this {replay}: {reasons[0]}.", False, (*reasons, *beside))
+        return Verdict(f"Do not trust this {replay}: {reasons[0]}.", False, (*reasons, *further))
     name = min(scored, key=lambda key: scored[key])
     these = "this record" if len(scored) == 1 else "these records"
     words = (
         f"This {replay} is to be trusted for events like these{_span(judged, name)}"
         f"{'' if fitted else f', if its numbers do not come from {these}'}: on {name}{other} it errs by "
-        f"{_said(scored[name])}."
+        f"{_error_text(scored[name])}."
     )
-    return Verdict(words, True, beside)
+    return Verdict(words, True, further)
 
 
 def _span(judged: Mapping[str, Held], name: str) -> str:
@@ -134,7 +134,7 @@ def _breaks(judged: Mapping[str, Held], most_error: float, *, trusted: bool) -> 
         until = f" to {instant(stop)} after {held.since}" if again else f" after {held.since} on"
         if trusted:
             lines.append(
-                f"on {name} it does not hold from {instant(start)}{until}: there it errs by {_said(variance)}"
+                f"on {name} it does not hold from {instant(start)}{until}: there it errs by {_error_text(variance)}"
             )
         elif held.spans:
             lines.append(f"on {name} it errs by at most {100 * most_error:.0f} % only {held.words}")
@@ -146,14 +146,14 @@ def _error(variance: float) -> float:
     return float(np.sqrt(np.maximum(0.0, 1.0 - variance / 100.0)))
 
 
-def _said(variance: float) -> str:
+def _error_text(variance: float) -> str:
     return f"{100 * _error(variance):.0f} % (VAF {variance:.1f} %)"
 
 
 def _errors(where: str, scores: Mapping[str, float], clause: str, most_error: float) -> list[str]:
     # a NaN is not a good score either
     return [
-        f"{where} {name}{clause} it errs by {_said(value)}"
+        f"{where} {name}{clause} it errs by {_error_text(value)}"
         for name, value in scores.items()
         if not _error(value) <= most_error
     ]

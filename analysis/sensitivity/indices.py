@@ -158,8 +158,8 @@ def _weights(blocks: int, resamples: int, seed: int) -> Iterator[Floats]:
     """Yield the number of occurrences of each block in each resample, in batches of shape (resample, block)."""
     source = np.random.default_rng(seed)
     batch = max(1, _BATCH // blocks)
-    for begun in range(0, resamples, batch):
-        drawn = source.integers(blocks, size=(min(batch, resamples - begun), blocks))
+    for start in range(0, resamples, batch):
+        drawn = source.integers(blocks, size=(min(batch, resamples - start), blocks))
         yield np.stack([np.bincount(row, minlength=blocks) for row in drawn]).astype(np.float64)
 
 

@@ -34,22 +34,22 @@ def _recorded(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
         yield "displacement_range", dataset["displacement_range"]
     if "impacts_per_period" in there:
         each = dataset["impacts_per_period"]
-        yield "impacts_per_period", _told(each.mean("period"), "1", "mean number of impacts in a period")
+        yield "impacts_per_period", _named(each.mean("period"), "1", "mean number of impacts in a period")
     elif "impact_count" in there:
         yield "impact_count", dataset["impact_count"]
     if "impact_velocity" in there:
         largest = _by_run(dataset, "impact", dataset["impact_velocity"].values, np.maximum)
-        yield "impact_velocity", _told(largest, _unit(dataset, "impact_velocity"), "largest impact velocity")
+        yield "impact_velocity", _named(largest, _unit(dataset, "impact_velocity"), "largest impact velocity")
     if "event_count" in there:
         yield "event_count", dataset["event_count"]
     for name in _sampled(dataset):
         squares = _by_run(dataset, "sample", dataset[name].values ** 2, np.add)
         root = (squares / dataset["sample_count"].where(dataset["sample_count"] > 0)) ** 0.5
-        yield f"{name}_rms", _told(root, _unit(dataset, name), f"root mean square of {name}")
+        yield f"{name}_rms", _named(root, _unit(dataset, name), f"root mean square of {name}")
     if "variance_accounted_for" in there:
         for number, pair in enumerate(dataset["compared"].values.tolist(), start=1):
             share = dataset["variance_accounted_for"].isel(compared=number - 1, drop=True)
-            yield f"variance_accounted_for_{number}", _told(share, "%", f"variance accounted for of {pair}")
+            yield f"variance_accounted_for_{number}", _named(share, "%", f"variance accounted for of {pair}")
 
 
 def _sampled(dataset: xr.Dataset) -> list[str]:
@@ -70,5 +70,5 @@ def _unit(dataset: xr.Dataset, name: str) -> str:
     return str(dataset[name].attrs.get("units", "1"))
 
 
-def _told(values: xr.DataArray, unit: str, words: str) -> xr.DataArray:
+def _named(values: xr.DataArray, unit: str, words: str) -> xr.DataArray:
     return values.drop_attrs().assign_attrs(units=unit, long_name=words)

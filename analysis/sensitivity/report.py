@@ -188,9 +188,9 @@ def _remarks(report: xr.Dataset, drawn: int) -> list[str]:
         if few.any():
             remarks.append(f"{name} has fewer than {FEWEST_BLOCKS} whole blocks of runs: it has no indices.")
         elif blocks.min() < drawn:
-            lost = drawn - int(blocks.min())
+            dropped = drawn - int(blocks.min())
             remarks.append(
-                f"{name}: {lost} of {drawn} blocks are left out, for runs that failed or have no such number; "
+                f"{name}: {dropped} of {drawn} blocks are left out, for runs that failed or have no such number; "
                 "indices are those of what is left."
             )
     return remarks
@@ -200,9 +200,9 @@ def _print(console: Terminal, found: xr.Dataset) -> None:
     """Print a table of the indices; along other keys their mean, lowest and highest value."""
     along = [str(dim) for dim in found.total_order.dims if dim not in ("quantity", "parameter")]
     interval = f"{100.0 * found.attrs['level']:g} %"
-    beside = "lowest to highest" if along else interval
+    heading = "lowest to highest" if along else interval
     first, total = ("first order, mean", "total, mean") if along else ("first order", "total")
-    headings = ("<quantity", "<parameter", f">{first}", f">{beside}", f">{total}", f">{beside}")
+    headings = ("<quantity", "<parameter", f">{first}", f">{heading}", f">{total}", f">{heading}")
     where = f" (along {', '.join(along)})" if along else ""
     title = f"Shares of variance: {found.attrs.get('title') or found.attrs['source']}{where}"
     console.print(table(title, *headings, rows=_rows(found, bool(along))))

@@ -17,7 +17,7 @@ _FEWEST_SAMPLES = 32
 #: Share of a block's samples, free of spikes, below which its median is not used.
 _LEAST_FREE = 0.25
 #: Relative decrease of the noise above which a window half as long is used.
-_WORTH = 0.05
+_LEAST_DECREASE = 0.05
 #: Shortest window, in lengths of the longest spike, which then moves its median by 3 % of the noise.
 _SPIKES_IN_WINDOW = 20
 
@@ -47,9 +47,9 @@ def running_median(values: Floats, window: int, used: NDArray[np.bool_] | None =
     if not medians:
         return running_median(values, length, used)
     # extended by straight lines to both ends: a constant there would turn the slope of the drift into a spike
-    for end, beside, place in ((0, 1, -0.5), (-1, -2, length - 0.5)):
+    for end, neighbour, place in ((0, 1, -0.5), (-1, -2, length - 0.5)):
         if len(medians) > 1 and len(centres) > 1:
-            slope = (medians[end] - medians[beside]) / (centres[end] - centres[beside])
+            slope = (medians[end] - medians[neighbour]) / (centres[end] - centres[neighbour])
             value = medians[end] + slope * (place - centres[end])
             where = 0 if end == 0 else len(centres)
             centres.insert(where, place)
@@ -69,6 +69,6 @@ def drift_window(values: Floats, longest_spike: int, used: NDArray[np.bool_]) ->
     while window // 2 >= shortest:
         window //= 2
         noise = robust_sigma((values - running_median(values, window, used))[used])
-        if noise < (1.0 - _WORTH) * lowest:
+        if noise < (1.0 - _LEAST_DECREASE) * lowest:
             best, lowest = window, noise
     return best

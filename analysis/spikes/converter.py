@@ -21,7 +21,7 @@ _ROUNDING = 4.0 * float(np.finfo(np.float32).eps)
 #: Smallest step in units of this rounding, and largest deviation of values from the grid, in steps.
 _CLEAR, _OFF_GRID = 20.0, 0.1
 #: Noise, in steps, above which estimates of the noise are independent of the steps.
-_FINE = 10.0
+_RESOLVED_NOISE = 10.0
 #: Largest number of distinct values of a converter: no record contains all values of 24 bits.
 _MOST_VALUES = 1 << 18
 #: Number of levels from which a signal is no switch, and number of samples for which a switch keeps its level.
@@ -52,7 +52,7 @@ def converter_step(values: Floats) -> float:
         return 0.0
     if distinct.size < _FEWEST_LEVELS and _is_switched(values):
         return 0.0
-    return step if _noise_between(values) < _FINE * step else 0.0
+    return step if _noise_between(values) < _RESOLVED_NOISE * step else 0.0
 
 
 def _is_switched(values: Floats) -> bool:

@@ -30,7 +30,7 @@ _STEADY = 0.1
 #: Highest harmonic of the fundamental that the strongest line may be.
 _HARMONICS = 8
 #: Ratio of the residuals below which the longer of two periods is the true one.
-_LONGER_PAYS = 0.7
+_LONGER_RATIO = 0.7
 _REFINEMENTS = 5
 
 
@@ -86,24 +86,24 @@ def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
         return _folded(values, period, f"a period of {period:g} samples was asked for")
     first = _strongest_line(level)
     if first is None:
-        return _none(values, "too short for ten cycles")
+        return _no_cycle(values, "too short for ten cycles")
     best = _fundamental(level, first)
     if best is None:
-        return _none(values, "no ten cycles of any line in its spectrum")
+        return _no_cycle(values, "no ten cycles of any line in its spectrum")
     if best.left > _MOST_LEFT:
-        return _none(
+        return _no_cycle(
             values,
             f"no cycle explains it: {min(best.left, 1.0):.0%} of its noise is left without the best one",
         )
     change = _change_of_amplitude(level, best)
     if change > _STEADY:
-        return _none(values, f"what repeats is not steady: its amplitude changes by {change:.0%}")
+        return _no_cycle(values, f"what repeats is not steady: its amplitude changes by {change:.0%}")
     # the drift again, now without the ripple that whole cycles leave in a running median
     drift = running_median(values - best.periodic, max(len(values) // 4, 1))
     return _folded(values - drift, refined_period(values - drift, best.period), "")
 
 
-def _none(values: Floats, reason: str) -> PeriodicPart:
+def _no_cycle(values: Floats, reason: str) -> PeriodicPart:
     return PeriodicPart(0.0, np.zeros(len(values)), 0, 1.0, reason)
 
 
@@ -131,7 +131,7 @@ def _fundamental(values: Floats, line: float) -> PeriodicPart | None:
         if len(values) / period < FEWEST_CYCLES:
             break
         trial = _folded(values, period, "")
-        if best is None or trial.left < _LONGER_PAYS * best.left:
+        if best is None or trial.left < _LONGER_RATIO * best.left:
             best = trial
     return best
 

@@ -44,7 +44,7 @@ _CYCLES_TO_SETTLE = 2.0
 #: Lowest threshold, relative to the largest value, for simulated signals, which have no noise.
 _SMALLEST_PART = 1e-3
 #: One over the assumed share of the record of the longest spike, in the first estimate of the drift.
-_FIRST_LOOK = 2000
+_FIRST_WINDOWS = 2000
 _FEWEST_SAMPLES = 16
 #: Height, relative to the noise, at which a person sees a spike. Number of samples without a spike that may be this
 #: high: a few, or this many times the number from normal noise.
@@ -264,8 +264,8 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
         chosen,
         interval,
         _remarks(channel, bad, step if noise < step else 0.0)
-        + (_unrest(residual[~bad], interval) if method == "threshold" and noise else []),
-        _dead(signal[~bad])
+        + (_motion_remark(residual[~bad], interval) if method == "threshold" and noise else []),
+        _constant(signal[~bad])
         + (_missed(time, looked_at, noise, threshold, chosen) if method != "cycle_median" else []),
     )
 
@@ -326,7 +326,7 @@ def _baseline(
         window = min(length, max(2, round(settings.baseline_window / interval)))
         return running_median(values, window, ~bad), window
     # the first estimate shows where the spikes are
-    first = running_median(values, drift_window(values, length // _FIRST_LOOK, ~bad), ~bad)
+    first = running_median(values, drift_window(values, length // _FIRST_WINDOWS, ~bad), ~bad)
     rest, used = values - first, ~bad
     used[used] = outside_excursions(rest[used])
     found = find_excursions(
@@ -385,7 +385,7 @@ def _after_start(
     return groups, begin
 
 
-def _unrest(residual: Floats, interval: float) -> list[str]:
+def _motion_remark(residual: Floats, interval: float) -> list[str]:
     """Return a remark if the signal between the spikes is a motion, which the threshold then describes."""
     samples = samples_in_half_wave(residual)
     if samples < HALF_WAVE_OF_MOTION:
@@ -399,7 +399,7 @@ def _unrest(residual: Floats, interval: float) -> list[str]:
     ]
 
 
-def _dead(values: Floats) -> list[str]:
+def _constant(values: Floats) -> list[str]:
     """Return a doubt if a channel is constant."""
     if np.ptp(values) > 0.0:
         return []
@@ -413,8 +413,8 @@ def _missed(
     from scipy.special import ndtr
 
     level = _SEEN_BY_EYE * noise
-    asked = settings.threshold is not None or settings.threshold_part is not None
-    if asked or not 0.0 < level < threshold:
+    is_given = settings.threshold is not None or settings.threshold_part is not None
+    if is_given or not 0.0 < level < threshold:
         return []
     high = find_excursions(time, statistic, level, settings.hysteresis)
     groups, _ = group_excursions(high, time, settings.merge, 1)

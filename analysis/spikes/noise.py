@@ -35,18 +35,18 @@ _FIRST_PART = 0.5
 _MOST_ROUNDS = 200
 #: Expected number of peaks, relative to false alarms, below which a peak is excluded from the noise. The number is
 #: small, since without its largest peaks heavy-tailed noise would seem to have a light tail.
-_GROWN = 0.01
+_EXPECTED_PEAKS = 0.01
 #: Number of stretches in which the record is searched for ringing, and smallest number of samples in one.
 _STRETCHES = 200
 _SHORTEST_STRETCH = 32
 _FEWEST_STRETCHES = 4
 #: Median magnitude, relative to that of the median stretch, above which a stretch rings. Noise alone, even Cauchy's in
 #: 32 samples, stays below.
-_RINGS = 3.0
+_RINGING = 3.0
 #: Number of half waves in a short stretch, and the same ratio for it. Narrow-band noise with a Rayleigh envelope
 #: exceeds this ratio once in 1e10 stretches.
 _HALF_WAVES = 20
-_RINGS_SHORTLY = 6.0
+_SHORT_RINGING = 6.0
 #: Magnitude, relative to the noise, of high samples; number of near ones that form an excursion beyond noise.
 STANDS_OUT = 4.0
 _AS_A_SPIKE = 4
@@ -55,7 +55,7 @@ _HALF_CYCLE = 8
 HALF_WAVE_OF_MOTION = 12.0
 #: RMS relative to the noise, over this number of samples, above which an excursion continues.
 _LOUD, _LOUD_SAMPLES = 1.5, 16
-_MOST_LOOKS = 20
+_MOST_PASSES = 20
 #: Share of quiet samples below which all samples count as quiet: the record is never at rest.
 _LEAST_OUTSIDE = 0.5
 #: Largest threshold relative to the largest peak of the noise: a hundred times rarer, with Student's t of 3 degrees.
@@ -123,8 +123,8 @@ def quiet(values: Floats) -> NDArray[np.bool_]:
     """Return a mask of the samples in stretches that do not ring; the values are without their baseline."""
     long = max(_SHORTEST_STRETCH, len(values) // _STRETCHES)
     short = max(_SHORTEST_STRETCH, _HALF_WAVES * len(values) // max(1, half_wave_peaks(values).size))
-    still = _still(values, long, _RINGS)
-    return still & _still(values, short, _RINGS_SHORTLY) if short < long else still
+    still = _still(values, long, _RINGING)
+    return still & _still(values, short, _SHORT_RINGING) if short < long else still
 
 
 def _still(values: Floats, stretch: int, ratio: float) -> NDArray[np.bool_]:
@@ -148,7 +148,7 @@ def outside_excursions(values: Floats) -> NDArray[np.bool_]:
     Shorter excursions are kept: they are the tail of the noise.
     """
     outside = np.ones(len(values), dtype=bool)
-    for _ in range(_MOST_LOOKS):
+    for _ in range(_MOST_PASSES):
         sigma = robust_sigma(values[outside])
         found = ~_long_excursions(values, sigma) if sigma > 0.0 else outside
         if np.count_nonzero(found) < _LEAST_OUTSIDE * len(values):
@@ -171,8 +171,8 @@ def _long_excursions(values: Floats, sigma: float) -> NDArray[np.bool_]:
     # half cycles of ringing are one excursion
     for part in np.split(high, np.flatnonzero(np.diff(high) > _HALF_CYCLE) + 1):
         if part.size >= fewest:
-            beside = int(part[-1] - part[0]) + 1
-            found[max(0, part[0] - beside) : part[-1] + 1 + beside] = True
+            margin = int(part[-1] - part[0]) + 1
+            found[max(0, part[0] - margin) : part[-1] + 1 + margin] = True
     power = np.convolve(values**2, np.full(_LOUD_SAMPLES, 1.0 / _LOUD_SAMPLES), "same")
     loud = found | (power > (_LOUD * sigma) ** 2)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], loud, [False])).astype(np.int8)))
@@ -212,7 +212,7 @@ def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float]:
     """Return shape and height above the level that noise exceeds `false_alarms` times, from the noise peaks alone."""
     count = max(_FEWEST_PEAKS // 2, int(_FIRST_PART * excesses.size))
     for _ in range(_MOST_ROUNDS):
-        height = _exceeded(*_pareto(excesses[:count], 0.0), count / (_GROWN * false_alarms))
+        height = _exceeded(*_pareto(excesses[:count], 0.0), count / (_EXPECTED_PEAKS * false_alarms))
         grown = int(np.searchsorted(excesses, height, side="right"))
         if grown <= count:
             break

@@ -67,14 +67,14 @@ def _settings(report: SpikeReport) -> Table:
     shown = "" if unit == "1" else f" {written_unit(unit)}"
     own = "" if found.unit == "1" else f" {written_unit(found.unit)}"
     chosen = found.settings
-    asked = chosen.threshold is not None or chosen.threshold_part is not None
-    why = "asked for" if asked else f"noise passes it {chosen.false_alarms:g} times in such a record"
+    is_given = chosen.threshold is not None or chosen.threshold_part is not None
+    why = "asked for" if is_given else f"noise passes it {chosen.false_alarms:g} times in such a record"
     rows = table("Identification", "<how", "<value", "<why")
     rows.add_row("method", found.method, found.reason)
     if found.cycle.found:
         period = found.cycle.period * found.interval
-        doubt = float(data.attrs["interval_uncertainty"])
-        within = f" ± {doubt:.1%}" if doubt else ""
+        uncertainty = float(data.attrs["interval_uncertainty"])
+        within = f" ± {uncertainty:.1%}" if uncertainty else ""
         rows.add_row("excitation", f"{1.0 / period:.6g} Hz{within}", f"{found.cycle.count} cycles")
     rows.add_row("threshold", f"{found.threshold:.4g}{shown}", why)
     rows.add_row("over at", f"{found.lower_threshold:.4g}{shown}", f"hysteresis {chosen.hysteresis:g}")

@@ -24,7 +24,7 @@ FOOT = 0.05
 #: Standard deviations of the noise below which no foot is searched.
 _FOOT_NOISE = 3.0
 #: Samples on each side of a peak in its band-limited interpolation, and interpolated points between two samples.
-_SAMPLES_BESIDE = 32
+_SAMPLES_OUTSIDE = 32
 _POINTS_BETWEEN = 16
 
 
@@ -161,14 +161,14 @@ def _cut_out(found: Identification, excursion: int, foot: float) -> _Pulse:
     sign = -1.0 if found.residual[top] < 0.0 else 1.0
     peak = float(sign * found.residual[top])
     level = min(0.5 * peak, max(foot * peak, _FOOT_NOISE * found.noise))
-    begin = _walk_down(found.residual, top, sign, level, -1)
-    end = _walk_down(found.residual, top, sign, level, 1)
+    begin = _foot_index(found.residual, top, sign, level, -1)
+    end = _foot_index(found.residual, top, sign, level, 1)
     time, values = _stretch(found, sign, begin, end, level)
     complete = begin >= 0 and end < len(found.time)
     return _Pulse(time, values, sign, level / peak if peak > 0.0 else 1.0, top, complete)
 
 
-def _walk_down(residual: Floats, top: int, sign: float, level: float, direction: int) -> int:
+def _foot_index(residual: Floats, top: int, sign: float, level: float, direction: int) -> int:
     """Return the first sample next to a peak that is not above a level; just outside the record if there is none."""
     reach = 64
     while True:
@@ -230,10 +230,10 @@ def _impulse(found: Identification, pulse: _Pulse, waveform: str) -> tuple[float
     between = float(np.trapezoid(pulse.values, pulse.time))
     level = np.array([pulse.level])
     parts = {name: float(each.part_above(level)[0]) for name, each in WAVEFORMS.items()}
-    doubt = 0.5 * between * (1.0 / min(parts.values()) - 1.0 / max(parts.values()))
+    waveform_error = 0.5 * between * (1.0 / min(parts.values()) - 1.0 / max(parts.values()))
     length = max(found.interval, float(pulse.time[-1] - pulse.time[0]))
     noise = found.noise * float(np.sqrt(found.interval * length))
-    return between / parts[waveform], float(np.hypot(noise, doubt))
+    return between / parts[waveform], float(np.hypot(noise, waveform_error))
 
 
 def _impulse_between(found: Identification, sign: float, begin: float, end: float) -> float:
@@ -255,7 +255,7 @@ def _band_limited(found: Identification, pulse: _Pulse) -> tuple[float, float]:
     from scipy.signal import resample
 
     top = pulse.top
-    first, stop = max(0, top - _SAMPLES_BESIDE), min(len(found.time), top + _SAMPLES_BESIDE + 1)
+    first, stop = max(0, top - _SAMPLES_OUTSIDE), min(len(found.time), top + _SAMPLES_OUTSIDE + 1)
     pauses = first + 1 + np.flatnonzero(np.diff(found.time[first:stop]) > PAUSE * found.interval)
     first, stop = max([first, *pauses[pauses <= top]]), min([stop, *pauses[pauses > top]])
     part = pulse.sign * found.residual[first:stop]

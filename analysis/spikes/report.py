@@ -223,14 +223,14 @@ def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floa
 def _fits(found: Identification, pulses: Pulses) -> Rows:
     """Return the parameters of the fitted curves, by curve and spike."""
     kept = pulses.complete
-    wanted = {
+    fields = {
         "peak": (found.unit, "peak of the fitted curve"),
         "length": ("s", "length of the fitted curve; its standard deviation for a bell"),
         "middle": ("s", "middle of the fitted curve"),
         "goodness": ("1", "part of the variance within the pulse that the curve explains"),
     }
     rows: dict[str, Row] = {}
-    for field, (unit, words) in wanted.items():
+    for field, (unit, words) in fields.items():
         values = np.array([getattr(pulses.fits[each], field)[kept] for each in WAVEFORMS])
         rows[f"spike_fit_{field}"] = (("waveform", "spike"), values, unit, words)
     return rows

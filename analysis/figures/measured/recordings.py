@@ -35,7 +35,7 @@ MOST_PANELS = 12
 _MOST_POINTS = 4000
 _LONGEST_NAME = 34
 _MOST_BANDS = 200
-_LOG_FROM = 30.0
+_LOG_RATIO = 30.0
 
 
 def draw_recording(recording: Recording, window: Window = ANY) -> Figure:
@@ -163,7 +163,7 @@ def _draw_train(axis: Axes, train: EventTrain) -> None:
             color=LINE,
             rasterized=True,
         )
-        if intervals.min() > 0.0 and intervals.max() > _LOG_FROM * intervals.min():
+        if intervals.min() > 0.0 and intervals.max() > _LOG_RATIO * intervals.min():
             axis.set_yscale("log")
     for begin, end in np.reshape(train.attrs.get("masked", ()), (-1, 2)):
         axis.axvspan(begin, end, color=STOP, alpha=0.3, linewidth=0.3)

@@ -33,7 +33,7 @@ _ZOOM_PERIODS = 12.0
 _BEFORE = 1.0 / 6.0
 _LONGEST_NAME = 14
 _MEASURED = "#8FBBDB"
-_NEARLY_ALL = 0.6
+_WHOLE_SHARE = 0.6
 """Share of the record above which its first part has no panel of its own."""
 # Range of the largest value outside which the label has a power of ten next to the unit.
 _SMALL, _LARGE = 1e-2, 1e4
@@ -125,7 +125,7 @@ def _parts(scores: xr.Dataset, time: Floats) -> list[Floats]:
         return [whole]
     length = _ZOOM_PERIODS / frequency
     first = np.array([max(time[0], onset - _BEFORE * length), min(time[-1], onset + length)])
-    return [whole, first] if np.ptp(first) < _NEARLY_ALL * np.ptp(whole) else [whole]
+    return [whole, first] if np.ptp(first) < _WHOLE_SHARE * np.ptp(whole) else [whole]
 
 
 def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, Floats], size: float) -> None:
@@ -167,12 +167,12 @@ def _say_scores(axis: Axes, scores: xr.Dataset, words: str) -> None:
     inverted = ", inverted" if float(scores["polarity"]) < 0.0 else ""
     # one digit more than the first digit of the error
     digits = 3 if error <= 0.0 or not np.isfinite(error) else max(0, 1 - int(np.floor(np.log10(error))))
-    doubt, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
+    error_text, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
     score = f"VAF {float(scores['variance_accounted_for']):.2f} %"
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     style: dict[str, Any] = {"transform": axis.transAxes, "ha": "right", "fontsize": 7, "bbox": box}
     axis.text(0.98, 0.05, words, va="bottom", **style)
-    axis.text(0.98, 0.95, f"{score}\nlag {lag:.{digits}f}{doubt} ms{given}{inverted}", va="top", **style)
+    axis.text(0.98, 0.95, f"{score}\nlag {lag:.{digits}f}{error_text} ms{given}{inverted}", va="top", **style)
 
 
 def _draw_residual(
@@ -199,11 +199,11 @@ def _draw_running(axis: Axes, scores: xr.Dataset, scale: float) -> None:
     start = scale * (scores["running_window_start"].values[known] + onset)
     stop = scale * (scores["running_window_stop"].values[known] + onset)
     shown = variance >= 0.0
-    beside = axis.twinx()
-    beside.hlines(variance[shown], start[shown], stop[shown], color=COLOURS[2], linewidth=1.2)
+    twin = axis.twinx()
+    twin.hlines(variance[shown], start[shown], stop[shown], color=COLOURS[2], linewidth=1.2)
     # worse than the mean: the arrow points towards the score
     below = 0.5 * (start + stop)[~shown]
-    beside.plot(below, np.full(len(below), 4.0), "v", color=COLOURS[2], markersize=3)
-    beside.set_ylim(0.0, 105.0)
-    beside.set_ylabel("VAF (%)", color=COLOURS[2])
+    twin.plot(below, np.full(len(below), 4.0), "v", color=COLOURS[2], markersize=3)
+    twin.set_ylim(0.0, 105.0)
+    twin.set_ylabel("VAF (%)", color=COLOURS[2])
     axis.tick_params(right=False)

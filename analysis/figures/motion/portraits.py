@@ -41,7 +41,7 @@ _PANEL_MM = 62
 # Marker size, points: small enough that ten thousand impacts do not merge.
 _DOT = 1.1
 # Impacts on one stop above which their marks have this size.
-_MANY = 200
+_MANY_IMPACTS = 200
 _QUARTERS = ("0", "π/2", "π", "3π/2", "2π")
 
 
@@ -156,7 +156,7 @@ def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def _draw_dots(
-    figure: Figure, axis: Axes, points: dict[int, tuple[Floats, Floats]], many: int = _MANY
+    figure: Figure, axis: Axes, points: dict[int, tuple[Floats, Floats]], many: int = _MANY_IMPACTS
 ) -> None:
     """Draw points of the impacts on each stop, small where they are many; several stops are named."""
     for place, (stop, (x, y)) in enumerate(points.items()):
@@ -192,7 +192,7 @@ def draw_return_map(dataset: xr.Dataset, view: View) -> Figure:
     figure = canvas(82)
     axis = figure.subplots()
     pairs = {stop: (values[:-1], values[1:]) for stop, values in chains.items()}
-    _draw_dots(figure, axis, pairs, _MANY - 1)  # there is one pair less than impacts
+    _draw_dots(figure, axis, pairs, _MANY_IMPACTS - 1)  # there is one pair less than impacts
     limit = 1.05 * max(float(values.max()) for values in chains.values())
     axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
     unit = unit_symbol(hits["impact_velocity"])

@@ -43,7 +43,7 @@ _MOST_LINES, _TICKS_FROM = 25, 0.94
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
 _CONTACT_FORCE = re.compile(r"contact_force(?:_([0-9]+))?$")
 # First instant, over the width of the panel, above which time counts from it.
-_LATE = 10.0
+_LATE_START = 10.0
 # Kinds of instants, and the variables with their times.
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
@@ -108,7 +108,7 @@ def count_time(axis: Axes, time: xr.DataArray, window: Window, words: str) -> No
     axis.set_xlabel(label(time) + words)
     low, high = axis.dataLim.intervalx
     first = float(time.values[0])
-    if window.given or not first > _LATE * (high - low) > 0.0:
+    if window.given or not first > _LATE_START * (high - low) > 0.0:
         return
     axis.xaxis.set_major_locator(_CountedFrom(first))
     digits = math.ceil(6.0 - math.log10(high - low))  # without the rounding of late instants

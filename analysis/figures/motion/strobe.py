@@ -15,7 +15,7 @@ from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 # Number of points of a section above which they are small, so that the layers of an attractor show.
-_MANY = 100
+_MANY_POINTS = 100
 
 
 def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
@@ -42,7 +42,7 @@ def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
 def draw_section(axis: Axes, run: xr.Dataset) -> None:
     """Draw displacement and velocity of one run at forcing phase 0."""
     x, y = run["strobe_displacement"], run["strobe_velocity"]
-    size = 2.5 if np.isfinite(x.values).sum() <= _MANY else 1.0
+    size = 2.5 if np.isfinite(x.values).sum() <= _MANY_POINTS else 1.0
     axis.plot(x.values, y.values, "o", markersize=size, markeredgewidth=0.0, color=LINE, rasterized=True)
     for values, limits in ((x, "xlim"), (y, "ylim")):
         same = one_value(values.values)

@@ -37,8 +37,8 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     parts = 100.0 * dataset["seconds"].values / dataset["run_seconds"].values[:, None]
     converges = "modes_tried" in dataset.attrs
     with page_style():
-        beside = _beside(dataset)
-        rows = np.array([max(_BAR_MM, _LINE_MM * (1 + words.count("\n"))) for words in beside])
+        texts = _bar_texts(dataset)
+        rows = np.array([max(_BAR_MM, _LINE_MM * (1 + words.count("\n"))) for words in texts])
         bars = 25 + float(rows.sum())
         # bars are as far apart as the text next to them is high
         places = ((rows.sum() - np.cumsum(rows) + 0.5 * rows) / _BAR_MM) - 0.5
@@ -50,7 +50,7 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
             axis = figure.subplots()
         axis.barh(places, 100.0 * dataset["share"].values, height=0.6, color=LINE, alpha=0.5)
         axis.plot(parts, np.broadcast_to(places[:, None], parts.shape), ".", color=MARK, markersize=2.5)
-        for place, words in zip(places, beside, strict=True):
+        for place, words in zip(places, texts, strict=True):
             axis.text(
                 0.98,
                 place,
@@ -71,7 +71,7 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _beside(dataset: xr.Dataset) -> list[str]:
+def _bar_texts(dataset: xr.Dataset) -> list[str]:
     """Return the text next to each bar: the changes without the effect, class and displacement range below."""
     found = []
     for row, words in enumerate(dataset["changes"].values):
@@ -91,15 +91,15 @@ def _beside(dataset: xr.Dataset) -> list[str]:
 def _draw_convergence(axis: Axes, dataset: xr.Dataset) -> None:
     """Draw the distance of each number of modes from the largest number, and the chosen number."""
     tried = json.loads(dataset.attrs["modes_tried"])
-    told = {int(n): off for n, off in tried.items() if isinstance(off, float | int) and off > 0.0}
+    distances = {int(n): off for n, off in tried.items() if isinstance(off, float | int) and off > 0.0}
     other = [int(n) for n, off in tried.items() if isinstance(off, str)]
     tolerance, taken = float(dataset.attrs["tolerance"]), int(dataset.attrs["modes_found"])
     axis.axhline(tolerance, color="0.5", linewidth=0.8, linestyle="--", label="tolerance")
-    axis.loglog(list(told), list(told.values()), "o-", color=LINE, markersize=3, linewidth=0.8)
-    if taken in told:
-        axis.plot(taken, told[taken], "o", color=MARK, markersize=5, label=f"taken: {taken}")
+    axis.loglog(list(distances), list(distances.values()), "o-", color=LINE, markersize=3, linewidth=0.8)
+    if taken in distances:
+        axis.plot(taken, distances[taken], "o", color=MARK, markersize=5, label=f"taken: {taken}")
     if other:
-        top = 2.0 * max([tolerance, *told.values()])
+        top = 2.0 * max([tolerance, *distances.values()])
         axis.plot(other, [top] * len(other), "x", color=LINE, markersize=4, label="another motion")
     numbers = sorted(map(int, tried))
     axis.set_xticks(numbers, [str(n) for n in numbers], fontsize=6)

@@ -100,7 +100,7 @@ def work_precision(dataset: xr.Dataset) -> Figure:
                 line = (dataset.sel({ways: way}) if ways else dataset).sortby(along)
                 values, seconds = line[name].values, line["wall_time"].values
                 shown = (values != 0.0) & np.isfinite(values) & (seconds > 0.0)
-                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _way(str(way)))
+                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _method_words(str(way)))
             axis.set(xscale="log", yscale="log", ylabel=label(dataset[name]))
         axes[-1].set_xlabel(label(dataset["wall_time"]))
         _label_seconds(axes[-1])
@@ -191,11 +191,11 @@ def _mark_steps(axis: Axes, steps: NDArray[np.float64]) -> None:
 
 def _entry(exchange: str, order: float) -> str:
     """Return the legend entry of one exchange; without errors to compare it has no order."""
-    name = _way(exchange)
+    name = _method_words(exchange)
     return f"{name} {order:.2f}" if np.isfinite(order) else f"{name} (none)"
 
 
-def _way(name: str) -> str:
+def _method_words(name: str) -> str:
     """Return the name of an exchange or of another method, in words."""
     return _WORDS.get(name, name.replace("_", " "))
 

@@ -45,13 +45,13 @@ _OF_STOPS: tuple[dict[str, dict[str, Any]], ...] = (
 
 # Distinct values above which a column is crowded, then the area (points squared) and the smallest opacity of its
 # points. The last number is the distance, over the largest value, below which two values are equal.
-_CROWD, _DOT, _FAINTEST, _TOLD_APART = 20, 0.7, 0.3, 1e-3
+_CROWDED, _DOT, _FAINTEST, _DISTINCT_STEP = 20, 0.7, 0.3, 1e-3
 # Median of a map, over its largest value, below which a linear scale would leave half of the map dark.
 _DARK = 0.15
 # Quantile of the values at the start of a logarithmic scale, so that one grazing impact does not stretch it.
 _LOWEST = 0.01
 # Ratio of the ends of a swept range above which a logarithmic axis shows more.
-_WIDE = 8.0
+_WIDE_RANGE = 8.0
 # Largest ratio of the ends of a logarithmic scale.
 _WIDEST = 1e6
 # Cells of a map of scattered points along each axis.
@@ -136,7 +136,7 @@ def is_logarithmic(values: Any) -> bool:
     (True, False, False)
     """
     ordered = np.sort(np.asarray(values, dtype=np.float64))
-    if ordered.size < 3 or not ordered[0] > 0.0 or ordered[-1] < _WIDE * ordered[0]:
+    if ordered.size < 3 or not ordered[0] > 0.0 or ordered[-1] < _WIDE_RANGE * ordered[0]:
         return False
     steps = np.diff(np.log(ordered))
     return bool(np.ptp(steps) <= _NOISE * abs(float(steps.max())))
@@ -297,9 +297,9 @@ def crowded(x: Any, y: Any) -> Any:
     places, owner = np.unique(x, return_inverse=True)
     values = np.asarray(y, dtype=np.float64)
     size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
-    told = np.unique(np.column_stack([owner, np.round(values / (_TOLD_APART * size))]), axis=0)
-    distinct = np.bincount(told[:, 0].astype(np.intp), minlength=places.size)
-    return distinct[owner] / _CROWD
+    rounded = np.unique(np.column_stack([owner, np.round(values / (_DISTINCT_STEP * size))]), axis=0)
+    distinct = np.bincount(rounded[:, 0].astype(np.intp), minlength=places.size)
+    return distinct[owner] / _CROWDED
 
 
 def draw_map(dataset: xr.Dataset) -> Figure:
