@@ -71,12 +71,12 @@ def verdict_by_method(doubts: Mapping[str, Sequence[str]]) -> str:
     >>> verdict_by_method({"decrement": ["it is bent"], "law": []})
     'sure of best damping law; not sure of logarithmic decrement, because it is bent.'
     """
-    sure = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if not reasons)
-    unsure = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if reasons)
+    reliable = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if not reasons)
+    unreliable = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if reasons)
     reasons = list(dict.fromkeys(reason for several in doubts.values() for reason in several))
-    if not sure or not unsure:
-        return f"sure of {sure}." if sure else verdict_of(reasons)
-    return f"sure of {sure}; not sure of {unsure}, because {'; '.join(reasons)}."
+    if not reliable or not unreliable:
+        return f"sure of {reliable}." if reliable else verdict_of(reasons)
+    return f"sure of {reliable}; not sure of {unreliable}, because {'; '.join(reasons)}."
 
 
 def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:

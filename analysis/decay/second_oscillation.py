@@ -65,7 +65,7 @@ def second_oscillation(samples: DecaySamples, first: ExponentialDecay) -> Second
     """
     residual = samples.value - first.fitted
     time = samples.time - samples.time[0]
-    apart = _LINE_DISTANCE * 2.0 * np.pi / float(time[-1])
+    least = _LINE_DISTANCE * 2.0 * np.pi / float(time[-1])
     omega, own = first.angular_frequency.value, first.decay_rate.value
     try:
         start = spectral_peak(replace(samples, value=residual))
@@ -81,7 +81,7 @@ def second_oscillation(samples: DecaySamples, first: ExponentialDecay) -> Second
     multiple = max(round(other / omega), 1) * omega
     explained = 1.0 - float(left @ left) / float(residual @ residual)
     noise = residual_test(left, float(np.max(np.abs(samples.value))), omega * samples.mean_interval).adequate
-    if not other > apart or abs(other - multiple) < apart or not (noise or explained > _EXPLAINED):
+    if not other > least or abs(other - multiple) < least or not (noise or explained > _EXPLAINED):
         return None
     count = len(time)
     aic = count * float(np.log(max(float(left @ left) / count, 1e-300))) + 2.0 * _PARAMETERS

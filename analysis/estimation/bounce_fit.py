@@ -319,9 +319,9 @@ def _start(points: Points, chain: Sequence[Piece], sign: float) -> tuple[Floats,
 
 
 def _outer(
-    piece: Piece, sign: float, stop: float, acceleration: float, edge: float, impact: float, way: float
+    piece: Piece, sign: float, stop: float, acceleration: float, edge: float, impact: float, direction: float
 ) -> float:
     """Return the instant at which the parabola of the first or last flight passes the stop, away from its impact."""
     # the flight lasts 2 V / g from the impact on; an edge beyond this instant means a longer flight
     speed = abs(piece.at(impact)[1])
-    return impact + way * max(2.0 * speed / acceleration, abs(edge - impact))
+    return impact + direction * max(2.0 * speed / acceleration, abs(edge - impact))

@@ -215,18 +215,18 @@ class ImpactEstimates:
     def verdict(self) -> str:
         """One line that says which methods are reliable, which are not, and why."""
         answered = [name for name in ANSWERING if name in self.values]
-        sure = [name for name in answered if not self.reasons(name)]
-        unsure = [name for name in answered if name not in sure]
+        reliable = [name for name in answered if not self.reasons(name)]
+        unreliable = [name for name in answered if name not in reliable]
         if not answered:
             why = ["no method has an answer", *(doubt.reason for doubt in self.doubts)]
             return message("not sure, because ", _listed(why), ".")
-        if not sure:
+        if not reliable:
             return message("not sure, because ", _listed([doubt.reason for doubt in self.doubts]), ".")
-        if not unsure:
-            return f"sure of {_named(sure)}."
-        why = [reason for name in unsure for reason in self.reasons(name)]
-        said = f"sure of {_named(sure)}; not sure of {_named(unsure)}, because "
-        return message(said, _listed(why), ".")
+        if not unreliable:
+            return f"sure of {_named(reliable)}."
+        why = [reason for name in unreliable for reason in self.reasons(name)]
+        opening = f"sure of {_named(reliable)}; not sure of {_named(unreliable)}, because "
+        return message(opening, _listed(why), ".")
 
     def unit_of(self, quantity: str) -> str:
         """Return the unit of a quantity; the channel's unit is filled in."""

@@ -116,7 +116,7 @@ def _run_methods(
 ) -> tuple[dict[str, Estimates], list[Refusal], Resampled | None]:
     """Return the estimates of each method, the refusals of the others, and the draws of the energy balance."""
     natural, offset = record.parameters.natural_frequency, record.parameters.offset
-    ways: dict[str, Callable[[], Estimates]] = {
+    estimators: dict[str, Callable[[], Estimates]] = {
         "weak_form": lambda: _weak_values(record, confidence),
         "trajectory": lambda: _trajectory_values(record, confidence),
         "period_one": lambda: period_one(record.segmentation, natural, offset),
@@ -130,9 +130,9 @@ def _run_methods(
         refusals = [Refusal(name, _reason(name, problem)) for name in energies]
     if resampled is not None:
         for name in energies:
-            ways[name] = partial(_energy_values, name, record, resampled, confidence)
+            estimators[name] = partial(_energy_values, name, record, resampled, confidence)
     values: dict[str, Estimates] = {}
-    for name, run in ways.items():
+    for name, run in estimators.items():
         if name not in methods:
             continue
         try:

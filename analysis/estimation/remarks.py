@@ -226,13 +226,13 @@ def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
     for method in ANSWERING:
         if best is None or method not in values or method == best:
             continue
-        apart = [
+        disjoint = [
             name
             for name, one in values[method].items()
             if name in values[best] and _contradict(name, one, values[best][name], confidence)
         ]
-        if apart:
-            quantities = " and ".join(name.replace("_", " ") for name in apart)
+        if disjoint:
+            quantities = " and ".join(name.replace("_", " ") for name in disjoint)
             yield Doubt(
                 f"{method} and {best} contradict each other about {quantities}",
                 () if method == "weak_form" else (method,),

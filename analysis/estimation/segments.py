@@ -206,8 +206,8 @@ def _exceeds_level(signal: Signal, level: float) -> bool:
 
 def _are_separate(cut: Segmentation, count: int) -> bool:
     """Tell whether all impacts are so far apart that a shorter window would show no more."""
-    apart = np.diff([impact.time for impact in cut.impacts])
-    return bool(len(apart) and not cut.stray and np.min(apart) > _SEPARATE * count * cut.signal.interval)
+    spacing = np.diff([impact.time for impact in cut.impacts])
+    return bool(len(spacing) and not cut.stray and np.min(spacing) > _SEPARATE * count * cut.signal.interval)
 
 
 def _possible_cut(

@@ -58,11 +58,11 @@ def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError
     """Return the error for a file that is missing or damaged."""
     if isinstance(problem, FileNotFoundError):
         return DatasetError(f"{os.fspath(path)}: expected a dataset file, got no such file.")
-    said = str(problem)
+    words = str(problem)
     if not isinstance(problem, OSError | RuntimeError | UnsoundFileError):
-        said = f"contents that do not fit together ({type(problem).__name__}: {said[:200]})"
+        words = f"contents that do not fit together ({type(problem).__name__}: {words[:200]})"
     return DatasetError(
-        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {said}. "
+        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {words}. "
         "The file is damaged or of another kind; write it again."
     )
 

@@ -130,9 +130,9 @@ def verdict(slopes: Floats, surrogate: Floats) -> str:
     first, stop = _longest_run(np.isfinite(slopes) & np.isfinite(surrogate))
     if stop - first < FEWEST_SLOPES:
         return "not decided: too few radii with C in the window"
-    said = _verdict(slopes[first:stop], surrogate[first:stop], first + 1)
+    found = _verdict(slopes[first:stop], surrogate[first:stop], first + 1)
     missing = [str(place + 1) for place in range(len(slopes)) if not first <= place < stop]
-    return said + (
+    return found + (
         f"; without m = {', '.join(missing)}: too few radii with C in the window" if missing else ""
     )
 

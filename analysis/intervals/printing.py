@@ -28,10 +28,10 @@ _MOST_GAPS = 20
 
 
 def _rows(report: xr.Dataset, numbers: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
-    said = report.attrs
-    begin, end = said["window"]
-    window = f"from {begin:.6g} to {end:.6g} s ({said['window_from']}), {said['masked_spans']} masked spans"
-    yield "events", str(said["events"]), window
+    attributes = report.attrs
+    begin, end = attributes["window"]
+    window = f"from {begin:.6g} to {end:.6g} s ({attributes['window_from']}), {attributes['masked_spans']} masked spans"
+    yield "events", str(attributes["events"]), window
     rate = numbers["rate"]
     per_minute = f"{60.0 * rate:.2f} per minute; standard error from 20 long bins"
     yield "rate", with_error(rate, numbers["rate_standard_error"], "Hz"), per_minute

@@ -103,9 +103,9 @@ def interval_report(
     }
     attributes: dict[str, Any] = {"cycle": cycle.words, "gaps": gap_words, "lattice": lattice_words}
     for scale in SCALES:
-        slopes, said = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
+        slopes, verdicts = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
         rows |= slopes
-        attributes |= said
+        attributes |= verdicts
     attributes |= {
         "events": len(train.times),
         "window": [float(edge) for edge in train.window],

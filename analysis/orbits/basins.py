@@ -292,16 +292,16 @@ class _Search:
         scale, radius = self._basins.scale, FARTHEST
         others = [each for each in self._basins.attractors if not each.is_chaotic]
         while radius >= NEAREST:
-            way = self._draw.uniform(-1.0, 1.0, (PROBES, states.shape[1]))
-            way *= self._draw.uniform(0.25, 1.0, (PROBES, 1)) / np.abs(way).max(axis=1, keepdims=True)
-            places = np.repeat(states, PROBES, axis=0) + radius * scale * np.tile(way, (len(states), 1))
+            offsets = self._draw.uniform(-1.0, 1.0, (PROBES, states.shape[1]))
+            offsets *= self._draw.uniform(0.25, 1.0, (PROBES, 1)) / np.abs(offsets).max(axis=1, keepdims=True)
+            places = np.repeat(states, PROBES, axis=0) + radius * scale * np.tile(offsets, (len(states), 1))
             ends = self._flow.follow(places, PROBE_PERIODS)
             # impossible probes (beyond a stop) do not count; all others must come nearer
             back = self._near(ends.states, states, 0.5 * radius) & ends.well
-            apart = not any(
+            separate = not any(
                 self._near(states, each.states, 2.0 * (radius + each.radius)).any() for each in others
             )
-            if ends.well.any() and (back | ~ends.well).all() and apart:
+            if ends.well.any() and (back | ~ends.well).all() and separate:
                 return radius
             radius /= 4.0
         return 0.0

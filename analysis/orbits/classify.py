@@ -389,10 +389,10 @@ def _dies_away(distances: Floats) -> bool:
 def _growth(states: Floats) -> float:
     """Return the mean rate at which neighbouring states separate, 1 / period (Rosenstein's estimate)."""
     count = len(states) - PERIODS_AHEAD
-    apart = np.abs(states[:count, None] - states[None, :count]).max(axis=2)
-    np.fill_diagonal(apart, np.inf)
-    nearest = apart.argmin(axis=1)
-    now = apart[np.arange(count), nearest]
+    distances = np.abs(states[:count, None] - states[None, :count]).max(axis=2)
+    np.fill_diagonal(distances, np.inf)
+    nearest = distances.argmin(axis=1)
+    now = distances[np.arange(count), nearest]
     later = np.abs(states[PERIODS_AHEAD:] - states[nearest + PERIODS_AHEAD]).max(axis=1)
     separate = (now > 0.0) & (later > 0.0)
     return float(np.mean(np.log(later[separate] / now[separate]))) / PERIODS_AHEAD if separate.any() else 0.0

@@ -196,11 +196,11 @@ class Follower:
         self, backward: Branch, forward: Branch, orbit: PeriodicOrbit, value: float
     ) -> Iterator[tuple[Branch, BranchOrbit]]:
         """Follow an orbit to lower values, then to higher values; a closed branch is passed once."""
-        for way, sign in ((backward, -1.0), (forward, 1.0)):
+        for branch, sign in ((backward, -1.0), (forward, 1.0)):
             if backward.is_closed:
                 return
-            for each in self.walk(way, orbit, value, sign):
-                yield way, each
+            for each in self.walk(branch, orbit, value, sign):
+                yield branch, each
 
     def walk(self, branch: Branch, orbit: PeriodicOrbit, value: float, sign: float) -> Iterator[BranchOrbit]:
         """Follow one way, at first towards higher (+1) or lower (-1) values; the branch grows with each orbit."""
@@ -247,14 +247,14 @@ class Follower:
                 branch.orbits.append(taken)
                 yield taken
                 continue
-            home = self._closing_step(branch.orbits[0], now, taken)
-            if home is not None:
-                step, taken = home
+            closing = self._closing_step(branch.orbits[0], now, taken)
+            if closing is not None:
+                step, taken = closing
             if (yield from self._passed(branch, now, taken, step)):
                 return
             branch.orbits.append(taken)
             yield taken
-            if home is not None:
+            if closing is not None:
                 branch.ends.append(CLOSED)
                 return
             now = taken
@@ -359,9 +359,9 @@ class Follower:
         turned = [
             np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _shifts(one, other)
         ]
-        apart = [each - one.orbit.phases for each in turned]
-        apart = [each - TURN * np.round(each.mean() / TURN) for each in apart]
-        nearest = min(apart, key=lambda each: float(np.abs(each).max()))
+        differences = [each - one.orbit.phases for each in turned]
+        differences = [each - TURN * np.round(each.mean() / TURN) for each in differences]
+        nearest = min(differences, key=lambda each: float(np.abs(each).max()))
         return np.append(nearest, (other.value - one.value) / self.settings.span)
 
     # ---- events of a step ----

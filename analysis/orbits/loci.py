@@ -97,13 +97,13 @@ class LocusFollower:
         OrbitError
             The bifurcation is of a kind that cannot be followed.
         """
-        ways = []
+        sides = []
         for sign in (-1.0, 1.0):
-            way = Locus(point.kind)
-            for _ in self.walk(way, point.at, values, sign):
+            side = Locus(point.kind)
+            for _ in self.walk(side, point.at, values, sign):
                 pass
-            ways.append(way)
-        return joined_loci(*ways)
+            sides.append(side)
+        return joined_loci(*sides)
 
     def walk(
         self, locus: Locus, at: BranchOrbit, values: tuple[float, float], sign: float

@@ -192,6 +192,6 @@ def periods_of(samples: Floats, tolerance: float = 1e-9) -> NDArray[np.int64]:
     found = np.zeros(rows, np.int64)
     scale = np.maximum(np.abs(samples).max(axis=1), 1e-300)
     for period in range(count // 2, 0, -1):
-        apart = np.abs(samples[:, period:] - samples[:, :-period]).max(axis=1)
-        found[apart <= tolerance * scale] = period
+        distance = np.abs(samples[:, period:] - samples[:, :-period]).max(axis=1)
+        found[distance <= tolerance * scale] = period
     return found

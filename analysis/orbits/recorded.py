@@ -101,11 +101,11 @@ def _round(phases: Floats, impacts: Impacts) -> tuple[int, int]:
     speeds = impacts.velocities / impacts.velocities.max()
     off: dict[int, float] = {}
     for count in range(1, min(phases.size // 2, MOST_IMPACTS) + 1):
-        gone = phases[count:] - phases[:-count]
-        periods = round(float(gone[0] / TURN))
+        advance = phases[count:] - phases[:-count]
+        periods = round(float(advance[0] / TURN))
         if periods >= 1 and (impacts.contacts[count:] == impacts.contacts[:-count]).all():
             slower = np.abs(speeds[count:] - speeds[:-count]).max()
-            off[count] = float(max(slower, np.abs(gone - TURN * periods).max()))
+            off[count] = float(max(slower, np.abs(advance - TURN * periods).max()))
             if off[count] <= REPEATS[0]:
                 break
     for close in REPEATS:

@@ -89,12 +89,12 @@ def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     p, whole = one.phases.size, TURN * one.periods
     for shift in range(p):
         turned = np.roll(np.arange(p), -shift)
-        apart = other.phases[turned] - one.phases
-        apart = np.mod(apart - apart[0] + 0.5 * whole, whole) - 0.5 * whole
+        difference = other.phases[turned] - one.phases
+        difference = np.mod(difference - difference[0] + 0.5 * whole, whole) - 0.5 * whole
         periods = (other.phases[turned][0] - one.phases[0]) / TURN
         whole_periods = abs(periods - round(periods)) * TURN < SAME
         same_contacts = (other.contacts[turned] == one.contacts).all()
-        if whole_periods and same_contacts and np.abs(apart).max() < SAME:
+        if whole_periods and same_contacts and np.abs(difference).max() < SAME:
             return True
     return False
 

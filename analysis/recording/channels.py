@@ -220,9 +220,9 @@ class Recording:
         if not self.remarks:
             return ()
         name, many = os.path.basename(self.title), len(self.remarks)
-        said = "1 remark of its import is" if many == 1 else f"{many} remarks of its import are"
+        counted = "1 remark of its import is" if many == 1 else f"{many} remarks of its import are"
         return (
-            f"{name}: {said} in its attribute `remarks` (`vibroimpact import {name} -o COPY.nc` shows them)",
+            f"{name}: {counted} in its attribute `remarks` (`vibroimpact import {name} -o COPY.nc` shows them)",
         )
 
     @property

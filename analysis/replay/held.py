@@ -52,13 +52,13 @@ class Held:
             return "nowhere"
         if self.spans == ((0.0, self.end),):
             return f"over the whole record ({instant(self.end)})"
-        said = [
+        shown = [
             f"to {instant(stop)}" if start == 0.0 else f"from {instant(start)} to {instant(stop)}"
             for start, stop in self.spans[:_MOST_SPANS]
         ]
         more = f" and in {len(self.spans) - _MOST_SPANS} spans more" if len(self.spans) > _MOST_SPANS else ""
         hidden = self.broken is None and self.spans[-1][1] < self.end
-        return f"{', '.join(said)} after {self.since}{more}{' (noise hides the rest)' if hidden else ''}"
+        return f"{', '.join(shown)} after {self.since}{more}{' (noise hides the rest)' if hidden else ''}"
 
 
 def held_over(

@@ -28,8 +28,8 @@ def print_comparison(console: Terminal, comparisons: Sequence[Comparison]) -> No
     """
     names = comparison_names(comparisons)
     rows = table("Simulated against measured", "<score", *(f">{name}" for name in names))
-    for heading, said in _ROWS:
-        cells = [said(comparison) for comparison in comparisons]
+    for heading, cell in _ROWS:
+        cells = [cell(comparison) for comparison in comparisons]
         if any(cells):
             rows.add_row(heading, *cells)
     _add_windows(rows, comparisons)

@@ -64,7 +64,7 @@ def draw_impact_estimate(dataset: xr.Dataset) -> Figure:
 
 def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
     """Draw signal, impacts and fitted motion over some flights, and the residual there."""
-    low, high, said = _window(dataset)
+    low, high, title = _window(dataset)
     part = dataset.sel(time=slice(low, high))
     upper, lower = axes
     impacts = dataset.impact_time.values
@@ -79,7 +79,7 @@ def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
     name = str(dataset.attrs.get("channel", "displacement")).replace("_", " ")
     upper.set_ylabel(f"{name} ({unit_symbol(dataset.measured)})")
     legend_above(upper, "right", columnspacing=2.0)
-    upper.set_title(said, loc="left", fontsize=7.5)
+    upper.set_title(title, loc="left", fontsize=7.5)
     lower.plot(part.time, part.measured - part.fitted, ".", color=LINE, markersize=1.2, rasterized=True)
     noise = float(dataset.attrs.get("noise", np.nan))
     if np.isfinite(noise):
@@ -99,8 +99,8 @@ def _window(dataset: xr.Dataset) -> tuple[float, float, str]:
     first = min(first, len(impacts) - _MOST_FLIGHTS - 1)
     margin = 0.3 * float(np.median(np.diff(impacts)))
     low, high = impacts[first] - margin, impacts[first + _MOST_FLIGHTS] + margin
-    said = f"impacts {first + 1} to {first + 1 + _MOST_FLIGHTS} of {len(impacts)}; gray: twice the noise"
-    return float(low), float(high), said
+    title = f"impacts {first + 1} to {first + 1 + _MOST_FLIGHTS} of {len(impacts)}; gray: twice the noise"
+    return float(low), float(high), title
 
 
 def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:

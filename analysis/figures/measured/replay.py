@@ -88,8 +88,8 @@ def comparison_of(dataset: xr.Dataset, recording: str | None) -> tuple[str, str]
             f"figure: recording: expected one of {recordings_of(dataset)}, got {got} named {recording!r}."
         )
     (place,) = places
-    said = {"fitted": "fitted on", "scored": "not fitted on"}.get(uses[place], "")
-    return names[place], ", ".join(part for part in (short_name(files[place]), said) if part)
+    role = {"fitted": "fitted on", "scored": "not fitted on"}.get(uses[place], "")
+    return names[place], ", ".join(part for part in (short_name(files[place]), role) if part)
 
 
 def recordings_of(dataset: xr.Dataset) -> str:

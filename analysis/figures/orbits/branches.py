@@ -109,16 +109,16 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         x, y = sorted(names, key=lambda name: name != first)
         panels[0].set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
     branch, special = runs[BRANCH].values, runs["orbit_special"].values
-    said: set[str] = set()
+    labelled: set[str] = set()
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         kind = SpecialOrbit(int(special[chosen[0]]))
         words = str(kind.name).replace("_", " ")
         style = _LOCI.get(kind, {"color": "0.4"})
-        shown = None if words in said else words
+        shown = None if words in labelled else words
         for axis in panels:
             axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
-        said.add(words)
+        labelled.add(words)
     if over is None:
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
@@ -158,7 +158,7 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
     rows = _rows(dataset, panel)
     places, branch = runs[name].values, runs[BRANCH].values
     stable, special = runs["orbit_stable"].values > 0, runs["orbit_special"].values
-    said: set[str] = set()
+    labelled: set[str] = set()
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         columns = min(rows[each].size for each in chosen)
@@ -169,9 +169,9 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
             shown = np.where(keep[:, None], values, np.nan)
             # a single orbit, which was not followed, is a mark instead of a line
             lines = axis.plot(places[chosen], shown, **style, **({} if chosen.size > 1 else _ALONE))
-            if words not in said and keep.any():
+            if words not in labelled and keep.any():
                 lines[0].set_label(words)
-                said.add(words)
+                labelled.add(words)
         for each in chosen[special[chosen] > 0]:
             kind = SpecialOrbit(int(special[each]))
             words = str(kind.name).replace("_", " ")
@@ -184,7 +184,7 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
                 markerfacecolor="white",
                 markeredgewidth=0.7,
                 color=MARK,
-                label=None if words in said else words,
+                label=None if words in labelled else words,
                 zorder=3,
             )
-            said.add(words)
+            labelled.add(words)

@@ -86,10 +86,10 @@ def _draw_curve(axis: Axes, dataset: xr.Dataset) -> None:
 def _draw_sweep(axis: Axes, dataset: xr.Dataset, along: str) -> None:
     for number, mode in enumerate(dataset["mode"].values.tolist()):
         own = dataset["residual_energy"].sel(mode=mode) / dataset["periods"]
-        for way in own["direction"].values.tolist() if "direction" in own.dims else [None]:
-            line = own if way is None else own.sel(direction=way)
+        for sweep in own["direction"].values.tolist() if "direction" in own.dims else [None]:
+            line = own if sweep is None else own.sel(direction=sweep)
             colour = COLOURS[number % len(COLOURS)]
-            axis.plot(line[along] if along in line.coords else np.arange(line.size), line, _MARKS.get(str(way), "."),
+            axis.plot(line[along] if along in line.coords else np.arange(line.size), line, _MARKS.get(str(sweep), "."),
                       color=colour, markersize=1.5, label=f"mode {mode}", rasterized=True)  # fmt: skip
     axis.axhline(0.0, color=STOP, linewidth=0.6)
     axis.set_xlabel(label(dataset[along]) if along in dataset.coords else along)

@@ -52,8 +52,8 @@ def draw_resonances(dataset: xr.Dataset) -> Figure:
                           markersize=3, label="peaks")  # fmt: skip
             _draw_natural(axis, dataset)
             kinetic = names and names[0].startswith("mean_kinetic")
-            said = "kinetic energy" if kinetic else names[0].replace("_", " ")
-            axis.set_ylabel(f"{said} ({unit_symbol(dataset[names[0]])})")
+            quantity = "kinetic energy" if kinetic else names[0].replace("_", " ")
+            axis.set_ylabel(f"{quantity} ({unit_symbol(dataset[names[0]])})")
             axis.set_ylim(bottom=0.0)
         axes[-1].set_xlim(float(frequency.min()), float(frequency.max()))
         axes[-1].set_xlabel(f"angular frequency ({unit_symbol(dataset['forcing'])})")

@@ -90,21 +90,21 @@ def work_precision(dataset: xr.Dataset) -> Figure:
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('wall time (s)', 'error (m)')
     """
-    along, ways = _ladder_of(dataset)
+    along, dim = _ladder_of(dataset)
     panels = [name for name in _QUANTITIES if name in dataset and along in dataset[name].dims]
     with page_style():
         figure = canvas(10 + 55 * len(panels))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axis, name in zip(axes, panels, strict=True):
-            for place, way in enumerate(dataset[ways].values if ways else [""]):
-                line = (dataset.sel({ways: way}) if ways else dataset).sortby(along)
+            for place, method in enumerate(dataset[dim].values if dim else [""]):
+                line = (dataset.sel({dim: method}) if dim else dataset).sortby(along)
                 values, seconds = line[name].values, line["wall_time"].values
                 shown = (values != 0.0) & np.isfinite(values) & (seconds > 0.0)
-                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _method_words(str(way)))
+                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _method_words(str(method)))
             axis.set(xscale="log", yscale="log", ylabel=label(dataset[name]))
         axes[-1].set_xlabel(label(dataset["wall_time"]))
         _label_seconds(axes[-1])
-        if ways:
+        if dim:
             figure.legend(
                 *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
             )

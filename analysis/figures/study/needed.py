@@ -23,5 +23,5 @@ def refuse_missing(missing: Sequence[str], expected: str, advice: str = "") -> N
     vibroimpact.fmus.errors.DatasetError: figure: expected what `vibroimpact accuracy` writes, got no cost, no error.
     """
     if missing:
-        said = f"figure: expected {expected}, got no {', no '.join(missing)}."
-        raise DatasetError(f"{said} {advice}".rstrip())
+        problem = f"figure: expected {expected}, got no {', no '.join(missing)}."
+        raise DatasetError(f"{problem} {advice}".rstrip())

@@ -210,8 +210,8 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
         )
         _fit_limits(axis, drawn)
         if drawn.size > 1 and one_value(drawn) is not None:
-            said = f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}"
-            axis.set_title(said, fontsize=7, loc="left")
+            title = f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}"
+            axis.set_title(title, fontsize=7, loc="left")
     axes[-1].set_xlabel(label(dataset[name]))
     if is_logarithmic(dataset[name].values):
         axes[-1].set_xscale("log")
