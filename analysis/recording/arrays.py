@@ -16,8 +16,8 @@ def channel_of(signal: Channel | xr.DataArray) -> Channel:
     Parameters
     ----------
     signal : Channel or xarray.DataArray
-        An array has one dimension with its instants as coordinate: numbers in seconds, or in the unit of the
-        coordinate's `units` (`1` in a nondimensional run), or times of NumPy. The attribute `units` of the array is
+        An array has one dimension with its instants as coordinate. Instants are numbers in seconds or in the unit of
+        the coordinate's `units` (`1` in a nondimensional run), or times of NumPy. The attribute `units` of the array is
         its unit; without it, the array is a pure number. NaN samples count as missing.
 
     Raises
