@@ -85,7 +85,7 @@ class PortEnd:
 
 
 class PointEnd:
-    """The point of a body of any tool as one end of a pair: it takes a force, or a pulse of force as an impulse."""
+    """The point of a body of any tool as one end of a pair: it takes a force, or an impulse as a pulse."""
 
     def __init__(
         self,
