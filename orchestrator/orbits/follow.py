@@ -39,8 +39,7 @@ EXACT_DIGITS, UNEXPLAINED_DIGITS = 11, 6
 
 @dataclass(eq=False)
 class Following(Study[str]):
-    """Orbits of a scene over one of its numbers: see `vibroimpact.follow`. A row names the branch or locus that
-    grows."""
+    """Orbits of a scene over one of its numbers: see `vibroimpact.follow`. A row names the branch or locus at work."""
 
     name = "follow"
     nothing = "an orbit"
