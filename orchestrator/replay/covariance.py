@@ -1,8 +1,8 @@
 """Errors of numbers fitted to replays: from the noise of all channels, and from the lags fitted with them.
 
 Numbers solve sum S e = 0 (e: residual, S: its slope by each number, over all samples). A lag that was found from the
-start of an event solves sum w e = 0 there (w: slope by the lag, less the effect of a gain or an offset). Both are
-linearised together, so that the errors of the numbers include the errors of the lags.
+start of an event solves sum w e = 0 there. Its weight w is the slope by the lag, less the effect of a gain or an
+offset. Both equations are linearised together, so that the errors of the numbers include the errors of the lags.
 """
 
 from __future__ import annotations

@@ -164,9 +164,7 @@ class _Fit:
         values, comparisons = self.better_start(values, comparisons)
         values, comparisons, told = self.start_with_effect(values, comparisons)
         remarks += told
-        self.refuse_alike(
-            self._slopes(values, comparisons)
-        )  # refuse before the search, which would not converge
+        self.refuse_alike(self._slopes(values, comparisons))  # before a search that would fail
         alignments = 0
         while alignments < MOST_ALIGNMENTS:
             alignments += 1
@@ -344,8 +342,7 @@ class _Fit:
         return found
 
     def refuse_alike(self, slopes: Sequence[Floats]) -> None:
-        """Raise EstimationError for numbers that the recordings do not separate, by the normal matrix of their
-        slopes."""
+        """Raise EstimationError for numbers that the recordings do not separate, by the normal matrix of slopes."""
         idle = self._idle(slopes)
         if idle.any():
             raise EstimationError(
