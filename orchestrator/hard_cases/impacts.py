@@ -1,4 +1,4 @@
-"""Impacts: a million of them, next to no room, several at one instant, several stops at one place."""
+"""Impacts: a million of them, in narrow gaps, several at one instant, several stops at one place."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _elastic() -> Found:
 
 
 def _nearly_elastic() -> Found:
-    """A mass that a force presses: flights of 2 r^n v / g that add up, equations.md 3.1."""
+    """A mass under a constant force: flights of 2 r^n v / g in a convergent sum, equations.md 3.1."""
     r, start = 0.999, -1.0
     record = run(
         body={"mass": 1.0, "stiffness": 0.0, "displacement_start": start},
@@ -115,7 +115,7 @@ COEFFICIENTS = (0.3, 0.7, 0.95)
 
 
 def _absolute_restitution() -> Found:
-    """What each impact gives a mass of a chain, or the tip of a clamped beam, whose shapes are 2 there."""
+    """Relative change of velocity at impacts of a chain's masses, and of a clamped beam's tip, whose shapes are 2."""
     errors = []
     for place, r in enumerate(COEFFICIENTS):
         chain = {"kind": "chain", "masses": list(MASSES), "stiffnesses": 1.0, "dampings": 0.05}
@@ -149,7 +149,7 @@ FALLS = np.array([0.25, 1.0, 3.0, 1024.0])
 
 
 def _at_a_border() -> Found:
-    """A free mass that meets its stop where one recording ends and the next begins, to the last bit or one beside."""
+    """A free mass meets its stop at the border of two recordings, exactly or one bit off."""
     wrong = []
     for fall in FALLS:
         body = {"mass": 1.0, "stiffness": 0.0, "displacement_start": -float(fall), "velocity_start": 1.0}
@@ -174,7 +174,7 @@ SMALLEST = np.array([1e-300, 1e-100, 1e-20])
 
 
 def _dead_stop() -> Found:
-    """A restitution next to 0: the motion is that with a dead stop."""
+    """A restitution near 0: the motion is the same as with a dead stop."""
 
     def end_of(r: float) -> tuple[float, float]:
         record = run(

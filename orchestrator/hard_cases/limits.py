@@ -1,4 +1,4 @@
-"""Long steps and numbers beyond all bounds: deadlines that are kept, one error, limits that change nothing."""
+"""Long steps and numbers beyond all bounds: deadlines hold, one error, limits do not change the motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONG_RUN: dict[str, Any] = {"transient_periods": 10**7, "recorded_periods": 1}
 
 
 def _deadlines() -> Found:
-    """Motions that one step would follow for minutes: each ends within its deadline, or says so."""
+    """Motions that would take minutes in one step: each run ends within its deadline and reports it."""
     scenes: list[dict[str, Any]] = [
         {  # two masses, a dashpot of 1e5 between the first and the ground
             "body": {
@@ -80,7 +80,7 @@ LIMITS = np.array([1, 10, 100, 1000])
 
 
 def _impact_limits() -> Found:
-    """A limit on impacts ends the run at that impact, whatever is recorded."""
+    """A limit on impacts ends the run at that impact, with any recording."""
 
     def end_of(limit: int, record: dict[str, Any]) -> np.ndarray[Any, Any]:
         found = recorded(
@@ -110,7 +110,7 @@ PERIODS = np.array([1, 16, 128, 512])
 
 
 def _long_free_motion() -> Found:
-    """An undamped oscillator that meets nothing: its energy after 512 periods, with samples and without."""
+    """An undamped oscillator without contact: its energy after 512 periods, with samples and without."""
     errors = []
     for count in PERIODS:
         for rate in (None, 10.0):

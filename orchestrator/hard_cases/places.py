@@ -1,4 +1,4 @@
-"""Stops in awkward places: at nodes, at the start, two of them for one motion to rest on."""
+"""Stops in awkward places: at nodes, at the start, two of them under one resting motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MIRRORED: dict[str, Any] = {
 
 
 def _at_a_node() -> Found:
-    """The outer masses swing against each other, sqrt(2) rad/s: the middle one, at its stop, stays."""
+    """The outer masses swing against each other at sqrt(2) rad/s: the middle mass stays at its stop."""
     end, samples = 100.0, 100
     record = run(
         body=MIRRORED | {"displacement_start": [0.3, 0.0, -0.3]},
@@ -43,7 +43,7 @@ def _at_a_node() -> Found:
 
 
 def _driven_at_a_node() -> Found:
-    """A force that is the same on both sides: the masses part at the first impact, and not before."""
+    """A force that is equal on both sides: the masses part at the first impact, and not before."""
     periods, rate = 5, 10.0
     record = run(
         body=MIRRORED,
@@ -90,7 +90,7 @@ def _starts() -> Found:
 
 
 def _rocking() -> Found:
-    """Two masses on dead stops that a spring makes rock: at rest on both after infinitely many impacts, in 10 s."""
+    """Two masses on dead stops, rocked by a spring: at rest on both after infinitely many impacts, in 10 s."""
     loads = 10.0 ** np.arange(-3.0, 4.0)
     errors = []
     for load in loads:
@@ -112,9 +112,9 @@ def _rocking() -> Found:
 BESIDE = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
 """Distances of the stop from the middle of a pinned beam, over its length."""
 COMPARED = 6
-"""Impacts of each run."""
+"""Compared impacts of each run."""
 OFF_THE_STOP = 1e-4
-"""Time after an impact at which the mode is off the stop, whatever the rounding."""
+"""Time after an impact at which the mode has left the stop, with any rounding."""
 
 
 def _beside_a_node() -> Found:
@@ -125,7 +125,7 @@ def _beside_a_node() -> Found:
 
 
 def _off_beside(location: float) -> float:
-    """Return the largest error of time and speed of the first impacts: mode 1 begins at rest, each impact moves it."""
+    """Return the largest error of time and speed of the first impacts. Mode 1 starts at rest; each impact moves it."""
     angle, r = math.pi * (location - 0.5), 0.8
     shapes = math.sqrt(2.0) * np.array([math.cos(angle), -math.sin(2.0 * angle)])
     rates = math.pi**2 * np.array([1.0, 4.0])

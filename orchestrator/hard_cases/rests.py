@@ -1,4 +1,4 @@
-"""Chatter, sticking, release: beams that come to rest, loads that turn round, rests that last."""
+"""Chatter, sticking, release: beams that come to rest, loads that turn round, long rests."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ BEAM = {"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_lengt
 
 
 def _pressed_beam() -> Found:
-    """A beam that a constant force presses to its stop: the force of the stop is that of statics."""
+    """A beam pressed to its stop by a constant force: the force of the stop is the static one."""
     modes, load, limit = 6, 5.0, 0.05
     shapes = beam_modes("clamped_free", modes)
     flexibility = shapes.shapes([0.5, 1.0]) / shapes.eigenvalues**2
@@ -53,7 +53,7 @@ def _pressed_beam() -> Found:
 
 
 def _turning_load() -> Found:
-    """A mass without a spring, at rest on its stop, under F cos(w t): it leaves where the force turns round."""
+    """A mass without a spring, at rest on its stop, under F cos(w t): it leaves where the force changes sign."""
     frequencies = 10.0 ** np.arange(-3.0, 4.0)
     errors = []
     for w in frequencies:
@@ -73,7 +73,7 @@ def _turning_load() -> Found:
 
 
 def _undamped_rest() -> Found:
-    """Four undamped modes whose point rests on a dead stop, in 1000 steps: the others keep their energy."""
+    """Four undamped modes with their point at rest on a dead stop, in 1000 steps: the others keep their energy."""
     end, samples = 1000.0, 1000
     record = run(
         body={**BEAM, "modes": 4, "displacement_start": [0.0, 0.1, 0.0, 0.0]},
@@ -108,7 +108,7 @@ def _stiff_rest() -> Found:
             record={"recorded_periods": 1},
         )
         assert record.impacts is not None
-        # the first contact ends where its force does: at a quarter of the period
+        # the first contact ends at the zero of its force: at a quarter of the period
         released = record.impacts[0, 0] + record.impacts[0, 6]
         errors.append(float(relative(released, 0.5 * math.pi / w)))
     off = np.array(errors)
@@ -119,7 +119,7 @@ def _stiff_rest() -> Found:
 
 
 def _chatter() -> Found:
-    """A mass that falls on a stop: the instant at which infinitely many bounces end, for every restitution."""
+    """A mass falls on a stop: the instant at which infinitely many bounces end, for every restitution."""
     coefficients = np.array([0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99])
     errors = []
     for r in coefficients:
@@ -140,17 +140,17 @@ FREE = {"mass": 1.0, "stiffness": 0.0}
 RELEASE_OFFSETS = np.array([-1e-2, -1e-5, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-5, 1e-2])
 """Change of the velocity at the start: the bounces end before the release, at it, or not at all."""
 RESOLVED_OFFSET = 1e-9
-"""Offset from which on rounding does not decide whether the mass comes to rest."""
+"""Offset above which rounding does not decide whether the mass comes to rest."""
 WELL_BEFORE = 1e-2
-"""Offset from which on the instant of rest is well-conditioned."""
+"""Offset above which the instant of rest is well-conditioned."""
 BOUNCING = (0.3, 0.5, 0.7, 0.95)
 """Restitutions."""
 COMPARED = 3
-"""First impacts that are compared: each multiplies an error by 1 to 5."""
+"""Compared first impacts: each multiplies an error by 1 to 5."""
 
 
 def _end_at_release() -> Found:
-    """A free mass under cos(t) bounces to rest as the load turns round, and next to it: where is it then?"""
+    """A free mass under cos(t) bounces to rest at the turn of the load, or near it; its later motion is compared."""
     errors = [
         [
             _off_bounces(r, abs(float(offset)), *start_that_ends_at_the_turn(r, float(offset)))
@@ -196,14 +196,14 @@ TURNS = 10
 
 
 def _pressed_in_turn() -> Found:
-    """A free mass that cos(t) presses to two stops in turn: how far beside the stops are its impacts?"""
+    """A free mass that cos(t) presses to two stops in turn: distance of its impacts from the stops."""
     off = np.array([[_off_turns(float(room), r) for r in (0.3, 0.8)] for room in ROOMS]).max(axis=1)
     curve = Curve(ROOMS, off, "room (-)", "error of impacts and rests as a way (-)", x_log=True)
     return Found(largest(off), curve)
 
 
 def _off_turns(room: float, r: float) -> float:
-    """Return the largest error of a time, times the speed of the first impact there: a way, that of cos(t) being 1."""
+    """Return the largest error of a time, times the first impact's speed there: a length; cos(t)'s path is 1."""
     record = run(
         body=FREE,
         forcing=TURNING,
@@ -242,7 +242,7 @@ def _fourth_order() -> Found:
 
 
 def _off_return(amplitude: float, w: float, ratio: float) -> float:
-    """Return the error of the next impact of a body that is at its stop, at 1, as the force is largest."""
+    """Return the error of the next impact of a body that is at its stop, at 1, at the largest force."""
     held = math.atan2(math.sqrt(max(0.0, (amplitude - 1.0) * (amplitude + 1.0))), 1.0) / w
     steady = amplitude / complex(1.0 - w**2, 2.0 * ratio * w)
     turned = steady * cmath.exp(1j * w * held)

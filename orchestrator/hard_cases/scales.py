@@ -1,4 +1,4 @@
-"""Scales and steps: units from nano to giga, one step of a million periods, samples that change nothing."""
+"""Scales and steps: units from nano to giga, one step of a million periods, samples without effect."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCALES = np.array([1e-9, 1e-6, 1e-3, 40.0, 1e3, 1e6, 1e9])
 
 
 def _units() -> Found:
-    """A chain on a rigid and a Kelvin-Voigt stop, all displacements times a number: the same motion."""
+    """A chain on a rigid and a Kelvin-Voigt stop, all displacements times a factor: the same motion."""
 
     def end_of(scale: float) -> np.ndarray[Any, Any]:
         record = run(
@@ -80,7 +80,7 @@ RATES = np.array([0.0, 1.0, 10.0, 97.0])
 
 
 def _samples() -> Found:
-    """An undamped beam that swings freely: however often it is sampled, it ends in the same place."""
+    """A free undamped beam ends in the same place at any sampling rate."""
     end = 1000.0
 
     def run_at(rate: float) -> tuple[np.ndarray[Any, Any], float]:
@@ -120,7 +120,7 @@ MODES = np.array([1, 2, 4, 8, 16, 32, 64])
 
 
 def _many_modes() -> Found:
-    """Undamped beams of up to 64 modes between elastic stops: bounded, outside of the stops, energy kept."""
+    """Undamped beams of up to 64 modes between elastic stops: bounded, outside the stops, energy kept."""
     errors, room, end, samples = [], 0.02, 10.0, 200
     for modes in MODES:
         record = run(

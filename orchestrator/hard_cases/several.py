@@ -1,4 +1,4 @@
-"""Several stops, of several laws: what one does while another is touched, and what all of them leave of the energy."""
+"""Several stops, of several laws: one acts while another is in contact, and the energy balance of all."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BEAM: dict[str, Any] = {**{"kind": "beam", "length": 1.0, "flexural_rigidity": 1
 
 
 def _balance(record_table: dict[str, Any], **tables: Any) -> tuple[Floats, Floats, int]:
-    """Return time, what the energy is off its balance over what has been turned over, and the impacts."""
+    """Return the time, the relative error of the energy balance, and the number of impacts."""
     series = {"rate": 20.0, "variables": [*BALANCED]}
     record = run(**tables, record={**record_table, "time_series": series})
     assert record.samples is not None
@@ -66,7 +66,7 @@ def _uneven_beam() -> Found:
 
 
 def _rest_beside() -> Found:
-    """A pinned beam rests on a dead stop while a Hunt-Crossley stop opposite is pressed, and lets go."""
+    """A pinned beam rests on a dead stop while an opposite Hunt-Crossley stop is pressed in, and lets go."""
     return _balanced(
         5,
         {"recorded_time": 12.0},
@@ -86,7 +86,7 @@ def _rest_beside() -> Found:
 
 
 def _overdamped() -> Found:
-    """An undamped stop under an overdamped mode and an undamped one gives its energy back."""
+    """An undamped stop under an overdamped mode and an undamped mode returns its energy."""
     return _balanced(
         1,
         {"recorded_time": 3.0},
@@ -99,7 +99,7 @@ DEPTHS = np.array([0.01, 0.03, 0.05, 0.07, 0.09])
 
 
 def _behind() -> Found:
-    """A rigid stop behind an undamped spring of 100 N/m: what is left is what energy says, equations.md 6.9."""
+    """A rigid stop behind an undamped spring of 100 N/m: energy gives the speeds, equations.md 6.9."""
     stiffness, r = 100.0, 0.9
     errors = []
     for depth in DEPTHS:

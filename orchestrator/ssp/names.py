@@ -28,7 +28,7 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
-#: Kinds of connectors of an element that give a value, and kinds that take a value; for a system, seen from inside,
+#: Kinds of connectors of an element that give a value, and kinds that take a value. For a system, seen from inside,
 #: the roles are exchanged.
 GIVING = frozenset({"output", "calculatedParameter", "local", "constant"})
 TAKING = frozenset({"input", "parameter", "structuralParameter"})
