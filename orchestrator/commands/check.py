@@ -1,4 +1,4 @@
-"""What `vibroimpact check` does: it says what a scene without problems runs, and what it would cost."""
+"""The command `vibroimpact check`: prints the problems of a scene, or its engine, effects and cost."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _WIDTH = 10
 
 
 def check_scene(options: Check) -> None:
-    """Load a scene, compute one point of it, and print what would run and what it would cost.
+    """Load a scene, compute one point of it, and print its engine, its effects and its cost.
 
     SceneError: the scene has problems. typer.Exit: the point failed.
     """

@@ -1,4 +1,4 @@
-"""`vibroimpact demo`: a scene file becomes a campaign, a dataset, a figure and numbers to check."""
+"""The command `vibroimpact demo`: a scene file becomes a campaign, a dataset, a figure and numbers to check."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 
 SCENE = "demo_scene.toml"
 STEPS_ALLOWED = 2.0
-"""How far a reading may lie from the exact value, in steps of the sweep."""
+"""Largest allowed distance of a reading from the exact value, in steps of the sweep."""
 
 
 def run_demo(options: Demo) -> None:
-    """Run the packaged bifurcation scene into a folder, draw its figure there, and say what was done and read.
+    """Run the packaged bifurcation scene into a folder, draw its figure there, and print the readings.
 
-    A reading that is not within `STEPS_ALLOWED` of its exact value raises CampaignError, an interrupted campaign
-    typer.Exit.
+    CampaignError: a reading is not within `STEPS_ALLOWED` of its exact value. typer.Exit: the campaign was
+    interrupted.
     """
     console, output = Terminal(soft_wrap=True), options.output
     began = time.perf_counter()

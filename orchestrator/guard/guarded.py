@@ -189,7 +189,7 @@ class GuardedRunner(Runner):
                 answers, last = self._child.answers(most)
                 found += answers
         except TimeoutError:
-            _, unread = self._end_child(at_once=True)  # first: the child may still be writing the unread answers
+            _, unread = self._end_child(at_once=True)  # first: the child may still be writing
             return found + unread, self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s")
         if found[-1] is not None:
             return found, None

@@ -11,11 +11,11 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 @study("orchestrator.study.accuracy.study:AccuracyOfScene", Door("accuracy", without=("write",)))
 class Accuracy(Operation):
-    """Show what accuracy costs in time: simulate a scene in all ways that it can be, against the best reference.
+    """Show accuracy against computing time: simulate a scene in all possible ways, against the best reference.
 
-    Ways: stops inside the body's FMU or as FMUs of their own (FMI 3.0, 2.0), plain steps of equal size, model
-    exchange; each at its settings. Times are medians of runs in turn. A sweep is left out. Exit code 2: no way
-    reaches the tolerance.
+    The ways are: stops inside the body's FMU; stops as FMUs of their own (FMI 3.0, 2.0); plain steps of equal size;
+    model exchange. Each way runs at its own settings. Times are medians of runs in turn. A sweep is ignored. Exit code
+    2: no way reaches the tolerance.
 
     Example: vibroimpact accuracy examples/single_run.toml -o accuracy.nc --figure accuracy.png --tolerance 1e-6
     """

@@ -1,4 +1,4 @@
-"""Arguments that operations on scenes share, worded once."""
+"""Arguments shared by operations on scenes."""
 
 from __future__ import annotations
 

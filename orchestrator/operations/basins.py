@@ -10,10 +10,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 @study("orchestrator.orbits.basins:BasinsOfScene", Door("basins", without=("output",)))
 class Basins(Operation):
-    """Find which attractor each start of a plane of displacements and velocities ends on, and the share of each.
+    """Find the attractor of each start in a plane of displacements and velocities, and the share of each attractor.
 
-    Attractors are found by long runs, named as classify names runs, and a start counts as soon as it is so near to one
-    that all starts tried at that distance came back.
+    Long runs find the attractors, and classes of runs name them. A start counts as soon as it is close to an
+    attractor: within a distance from which all test starts came back.
 
     Example: vibroimpact basins examples/basins.toml --points 500 -o basins.nc --figure basins.png
     """

@@ -11,10 +11,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 @study("orchestrator.orbits.control:Controlled", Door("control", without=("output", "keep")))
 class Control(Operation):
-    """Keep a periodic orbit, also where it is unstable, by small corrections of the forcing amplitude at each impact.
+    """Keep a periodic orbit, even an unstable one, by small corrections of the forcing amplitude at each impact.
 
-    Meanwhile the angular frequency goes on, step by step, whenever the impact velocity has settled. Body, stop and
-    controller are coupled FMUs (the controller's needs vibroimpact[python-fmus]).
+    The angular frequency moves on, step by step, whenever the impact velocity has settled. Body, stop and controller
+    are coupled FMUs (the controller needs vibroimpact[python-fmus]).
 
     Example: vibroimpact control examples/bifurcation.toml --from 1 --to 0.7 -o kept.nc --figure kept.png
     """

@@ -15,12 +15,12 @@ from vibroimpact.fmus.operations import Door, Operation, Option, Positional, ope
 class ExportFmu(Operation):
     """Write an FMU for another tool: a component, or the body of a scene with its stops. Needs no compiler.
 
-    A component that is given no forcing, contact or start of motion starts displaced, so that a run of it shows motion.
-    A scene's numbers are the start values; what it sweeps has the value that it has in its own table.
+    A component without forcing, contact or initial motion starts displaced, so that its run shows motion. A scene's
+    numbers are the start values; a swept key has the value in its own table.
 
     Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
 
-    A rig, ready: vibroimpact fmu export examples/single_run.toml -o rig.fmu
+    A whole rig: vibroimpact fmu export examples/single_run.toml -o rig.fmu
 
     A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
     """

@@ -12,10 +12,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, 
 class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
-    Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
-    and the force harmonic. Orbits to begin with are looked for along the range; --seed is one of the scene as it is,
-    --from-dataset one at the values of its run. With --second folds, period doublings and grazes are curves over both
-    numbers, and these are what is written and drawn; the branches are printed.
+    Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid, the
+    force harmonic. First orbits are searched along the range. --seed gives one for the scene as it is, --from-dataset
+    one at the values of its run. With --second, folds, period doublings and grazes are curves over both numbers. The
+    curves are then written and drawn, and the branches are printed.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """

@@ -21,8 +21,8 @@ from vibroimpact.orchestrator.operations.arguments import Changes
 class Maps(Operation):
     """Draw a map of a scene: impacts or states at phase 0 with its orbits, sets of grazing impacts, normal forms.
 
-    S are the impacts whose next one is a graze, W those that a graze leads to. Nordmark's map is that of the forcing
-    amplitude at its first graze.
+    The set S has the impacts whose next impact is a graze, the set W the impacts after a graze. Nordmark's map varies
+    the forcing amplitude around its first graze.
 
     Example: vibroimpact maps examples/thesis/figure_2_12.toml --kind discontinuity --figure sets.png
     """

@@ -13,10 +13,10 @@ from vibroimpact.fmus.operations import Door, FigureFile, Force, Operation, Opti
     Door("replay", without=("save_scene", "workers", "scheduler")),
 )
 class Replay(Operation):
-    """Drive a scene by recorded channels and compare its motion with what was measured.
+    """Drive a scene by recorded channels and compare its motion with measured channels.
 
     One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
-    recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
+    recordings and the scene's sweep, on many workers; the same command resumes it.
 
     Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
     """

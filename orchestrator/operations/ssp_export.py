@@ -11,9 +11,9 @@ from vibroimpact.orchestrator.operations.arguments import Changes
 
 @operation("orchestrator.commands.ssp:export_to_archive", Door("export_ssp"))
 class ExportSsp(Operation):
-    """Write a scene of components as a system that other tools run: FMUs, start values, connections.
+    """Write a scene of components as a system for other tools: FMUs, start values, connections.
 
-    What SSP has no words for (events, record, sweep, execution) travels in an annotation, and comes back with it.
+    Parts without a form in SSP (events, record, sweep, execution) go into an annotation, which an import reads back.
 
     Example: vibroimpact ssp export examples/two_oscillators.toml -o two.ssp
     """

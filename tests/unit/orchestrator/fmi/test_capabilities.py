@@ -527,7 +527,7 @@ def test_clocked_components_feed_each_other_at_one_tick(folder: Path) -> None:
     outputs = [importer.components[name].group("Float64", ["y"]) for name in "ab"]
     importer.begin()
     importer.advance(0.5)
-    assert [group.get()[0] for group in outputs] == [30.0, 60.0]  # values of the tick at .4: 10 ticks, and a.y
+    assert [group.get()[0] for group in outputs] == [30.0, 60.0]  # at the tick at .4: 10 ticks, and a.y
     with pytest.raises(ComponentError, match=r"a: fmi3GetFloat64 returned error"):
         values(importer, "a", "y")  # a value without a reader is not kept
     importer.free()
