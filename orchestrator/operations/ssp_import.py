@@ -11,8 +11,7 @@ from vibroimpact.orchestrator.operations.arguments import Changes
 
 @operation("orchestrator.commands.ssp:import_to_scene", Door("import_ssp"))
 class ImportSsp(Operation):
-    """Write a system as a scene file, with its FMUs in a folder beside it. `vibroimpact run` takes the system as it
-    is.
+    """Write a system as a scene file, with its FMUs in a folder beside it. `vibroimpact run` takes the system as it is.
 
     Example: vibroimpact ssp import two.ssp -o two.toml
 
