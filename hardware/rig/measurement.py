@@ -27,8 +27,7 @@ _FROZEN = ConfigDict(extra="forbid", frozen=True)
 FEWEST_SAMPLES = 2
 """Fewest samples of a recording."""
 MOST_FILLED, FILLED_ANYHOW = 10, 1_000_000
-"""Rows per kept sample, plus a constant, up to which lost samples are rows of NaN; above, only the ends of gaps
-are."""
+"""Rows per kept sample, plus a constant, up to which lost samples are rows of NaN; above, only gaps' ends are."""
 
 
 class MeasuredInput(BaseModel):
