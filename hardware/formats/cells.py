@@ -30,8 +30,7 @@ MISSING_WORDS = frozenset(
     | {"1.#ind", "-1.#ind"}
 )
 OVERRANGE_FROM = 9.8e37
-"""Absolute value above which a number means overrange: SCPI instruments write 9.9e37, LabVIEW 1e308; no signal
-does."""
+"""Absolute value above which a number means overrange: SCPI instruments write 9.9e37, LabVIEW 1e308."""
 NOT_A_NUMBER = 9.91e37
 """SCPI's number for a missing sample."""
 

@@ -72,8 +72,8 @@ def read_labview(content: str) -> RawFile:
 
 
 def _without_special_blocks(lines: Sequence[str]) -> tuple[list[str], int]:
-    """Return the lines without the blocks of other programs, ***Start_Special*** to ***End_Special***, and their
-    number."""
+    """Return the lines without blocks of other programs (***Start_Special*** to ***End_Special***), and their
+    count."""
     kept, blocks, inside = [], 0, False
     for line in lines:
         if line.startswith("***Start_Special***"):

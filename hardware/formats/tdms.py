@@ -34,8 +34,7 @@ _SCALE_NUMBER = re.compile(r"NI_Scale\[(\d+)\]")
 _COEFFICIENTS = re.compile(r"NI_Scale\[\d+\]_Polynomial_Coefficients_Size")
 _SCALES = "NI_Number_Of_Scales"
 _MOST_SCALES = 100
-"""Most scales of a channel, and coefficients of a polynomial: npTDMS loops over the declared number, NI writes a
-few."""
+"""Most scales of a channel, and coefficients of a polynomial: npTDMS loops over the declared number, NI writes few."""
 _EPOCH_ENDS = np.datetime64("1904-01-02")
 
 

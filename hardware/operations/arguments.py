@@ -1,4 +1,4 @@
-"""Arguments that operations on rigs share, worded once."""
+"""Arguments shared by operations on rigs."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from vibroimpact.fmus.operations import Door, Force, Operation, Option, Positional, operation
 
 Setting = partial(Option, python="")
-"""Options that say something of the columns are one argument in Python: `settings`."""
+"""Options on columns are one argument in Python: `settings`."""
 
 
 @operation(
@@ -17,7 +17,7 @@ Setting = partial(Option, python="")
     Door("import_recording", also=("settings: ImportSettings | Mapping[str, Any] | None = None",)),
 )
 class ImportFiles(Operation):
-    """Import measurements of one laboratory run into a recording, and say what is odd about them.
+    """Import measurements of one laboratory run as a recording, and report gaps, clipping and unit doubts.
 
     Example: vibroimpact import base.txt board.txt --name base --name board --unit g -o a0.nc --figure a0.png
     """

@@ -1,4 +1,4 @@
-"""What programs that measure have in common: what is asked for, checked; the rig opened; the recording at the end."""
+"""Shared parts of measuring programs: the checked request, the opened rig, the recording at the end."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from vibroimpact.hardware.rig.opening import Rig, opened_rig, refusal_of
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
 
 UNKNOWN_DURATION = 60.0
-"""Time, s, for which a disk must have room where nobody says how long it is to be measured."""
+"""Time, s, for which a disk must have room if a measurement has no duration."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """Which inputs are measured, how fast and how long."""
+    """The request: inputs, rate and duration."""
 
     inputs: tuple[Input, ...]
     loopbacks: frozenset[str]
-    """Names of inputs to which an output is wired."""
+    """Names of inputs that an output is wired to."""
     calibrations: dict[str, Calibration]
     rate: float
     """Hz."""
@@ -57,7 +57,7 @@ def wanted_of(
     rate: float,
     duration: float | None,
 ) -> Wanted:
-    """Return the measurement that is asked for; raise UsageError, with nothing opened yet, if it cannot be meant."""
+    """Return the requested measurement; UsageError, before anything is opened, if the request is invalid."""
     inputs = inputs_of([*channels, *loopbacks])
     if not inputs:
         raise UsageError(
@@ -88,12 +88,12 @@ def measured(
     journal: str | os.PathLike[str] | None = None,
     live: bool = False,
 ) -> Recording:
-    """Measure, and return the recording; its attribute `ended` says why it is shorter than asked for.
+    """Measure, and return the recording; its attribute `ended` is the reason if it is shorter than requested.
 
-    The rig is as `--rig` has it, one that is open, or (None) the board of this machine. `describe` returns the
-    measurement, once the device has said what it makes of the inputs and the rate. It ends after `most_pulses`, where
-    only pulses are measured. All is kept in `journal` meanwhile (None: in memory), which stays there: who has the
-    recording removes it. UsageError, RigError: the rig refuses what is asked for, or fails before there are samples.
+    The rig is a text for `--rig`, an open rig, or (None) the board of this machine. `describe` returns the
+    measurement, once the device has given its actual inputs and rate. A measurement of pulses ends after
+    `most_pulses`. All samples go to `journal` meanwhile (None: to memory). The journal stays there: the owner of the
+    recording removes it. UsageError, RigError: the rig refuses the request, or fails before there are samples.
     """
     with ExitStack() as stack:
         opened = rig if isinstance(rig, Rig) else stack.enter_context(opened_rig(rig))
@@ -146,12 +146,12 @@ def measure_into(
     in_pieces: bool = False,
     most_pulses: int | None = None,
 ) -> None:
-    """Measure into a file, with a journal beside it meanwhile, which is removed when the file is safely there.
+    """Measure into a file, with a journal beside it; the journal is removed once the file is complete.
 
-    Where only pieces are kept (`in_pieces`) nobody knows how many: the disk must have room for those of a minute.
-    UsageError before anything is measured: the file, its disk, or the measurement is not to be had. UsageError after
-    it: the file could not be written, and the journal is still there. RigError: the measurement ended early, and what
-    was measured is in the file.
+    If only pieces are kept (`in_pieces`), their number is unknown: the disk must have room for a minute of samples.
+    UsageError before the measurement: the file, its disk, or the measurement is not available. UsageError after it:
+    the file could not be written, and the journal is still there. RigError: the measurement ended early, and its
+    samples are in the file.
     """
     output = options.output
     refuse_outputs((), output, None)

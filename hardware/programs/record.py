@@ -28,29 +28,29 @@ def record(
     Parameters
     ----------
     rig : str, Rig or None
-        `virtual:RIG.toml`, `grpc://host:port` or `local`, or one that is open; None: the board of this machine.
+        `virtual:RIG.toml`, `grpc://host:port` or `local`, or an open rig; None: the board of this machine.
     channels : sequence of str
-        `NAME=TERMINAL[,RANGE]`, the range in V; 8 at most.
+        `NAME=TERMINAL[,RANGE]`, the range in V; at most 8.
     rate : float
         Samples per second and channel.
     duration : float or None
-        s; None: until Ctrl-C, which ends it with all that was measured.
+        s; None: until Ctrl-C, which ends it and keeps the samples so far.
     loopback : sequence of str
-        Likewise, of inputs to which an output is wired.
+        The same for inputs that an output is wired to.
     calibration : sequence of path
         Files of calibrations: their channels are in m or N, others in V.
     journal : path or None
-        File that has all of it meanwhile, and afterwards; None: none.
+        File that keeps all samples, during the measurement and after it; None: no file.
 
     Returns
     -------
     Recording
-        Its attribute `ended` says why it is shorter than asked for; empty: it is not.
+        Its attribute `ended` is the reason if it is shorter than requested; else empty.
 
     Raises
     ------
     UsageError, RigError
-        What is asked for cannot be had, or the rig failed before there were samples.
+        The request cannot be met, or the rig failed before there were samples.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Record the pulses of a load cell, and nothing between them."""
+"""Record the pulses of a load cell, and no samples between them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.hardware.rig.measurement import Measurement, PulseRule, measure
 from vibroimpact.hardware.rig.opening import Rig
 
 MOST_BESIDE = 10**6
-"""Samples before or after a pulse, at most."""
+"""Most samples before or after a pulse."""
 
 
 def record_spikes(
@@ -36,38 +36,38 @@ def record_spikes(
     calibration: Sequence[str | os.PathLike[str]] = (),
     journal: str | os.PathLike[str] | None = None,
 ) -> Recording:
-    """Record the pulses of a channel with the samples around them; what is between them is not kept.
+    """Record the pulses of a channel with the samples around them; samples between them are not kept.
 
     Parameters
     ----------
     rig, channels, rate, duration, calibration, journal
-        As of `record`.
+        As in `record`.
     threshold : float
-        In the unit of the channel; negative: pulses below it.
+        In the unit of the channel; negative for pulses below it.
     on : str
-        Channel that has the pulses; empty: the first. The others are kept while it has one.
+        Channel with the pulses; empty: the first. The other channels are kept during its pulses.
     hysteresis : float
-        Part of the threshold below which a pulse is over.
+        Part of the threshold, below which a pulse is over.
     presamples, postsamples : int
-        Samples that are kept of before and after a pulse.
+        Samples kept before and after a pulse.
     dead_time : float
-        s from the start of a pulse within which another passage of the threshold belongs to it.
+        s from the start of a pulse, in which a new crossing of the threshold belongs to it.
     pulses : int or None
-        Pulses after which it ends.
+        Number of pulses after which it ends.
 
     Returns
     -------
     Recording
-        With the event train `pulses`: instants, peaks and impulses at a first look.
+        With the event train `pulses`: instants, and first estimates of peaks and impulses.
 
     Raises
     ------
     UsageError, RigError
-        As of `record`; also where there is no pulse.
+        As in `record`; also if there is no pulse.
     """
     wanted = wanted_of(channels, (), calibration, rate, duration)
     options = RecordSpikes(
-        output=Path(),  # nothing is written but the journal
+        output=Path(),  # only the journal is written
         channel=list(channels),
         rate=rate,
         duration=duration,
@@ -107,7 +107,7 @@ def _describer(wanted: Wanted, options: RecordSpikes) -> Describe:
 
 
 def _refuse_wrong(options: RecordSpikes, names: Sequence[str]) -> None:
-    """Raise UsageError, of all problems at once, if options of pulses are wrong for channels of these names."""
+    """Raise UsageError, with all problems at once, if options of pulses are wrong for channels of these names."""
     dead = options.dead_time * options.rate
     rules = (
         ("--threshold", "a finite number, not 0", options.threshold, 0.0 < abs(options.threshold) < np.inf),

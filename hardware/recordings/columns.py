@@ -1,4 +1,4 @@
-"""Which columns of a file become something, and which one has the instants, by what the user says."""
+"""The columns of a file to import, and their column of instants, by the user's choice."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ NO_COLUMN = "none"
 
 
 def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
-    """Return the tables of a file with the columns that the user wants, instants told apart and in s.
+    """Return the tables of a file with the selected columns, with instants set apart and in s.
 
-    Numbers of columns count from 1 through all columns of all tables, the instants with them where they stand. A
-    missing column that the user names, or doubtful instants, raise DatasetError.
+    Numbers of columns count from 1 through all columns of all tables, including instants at their place in the file.
+    DatasetError: a named column is missing, or the instants are doubtful.
     """
     tables = list(raw.tables)
     numbered = [column for table in tables for column in _in_file_order(table)]
@@ -33,7 +33,7 @@ def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
 
 
 def _beyond_doubt(table: Table, settings: ImportSettings) -> Table:
-    """Return the table without instants that may be others, where a rate replaces them; else ask."""
+    """Return the table without doubtful instants if a rate replaces them; else raise DatasetError."""
     if table.time is None or not table.time.doubt:
         return table
     if settings.rate is not None:
@@ -48,7 +48,7 @@ def _beyond_doubt(table: Table, settings: ImportSettings) -> Table:
 
 
 def _in_file_order(table: Table) -> list[Column]:
-    """Return the columns as they stand in the file, the instants among them."""
+    """Return the columns in the order of the file, including the instants."""
     columns = list(table.columns)
     if table.time is not None:
         columns.insert(table.time_place, table.time)
@@ -56,7 +56,7 @@ def _in_file_order(table: Table) -> list[Column]:
 
 
 def _find(wanted: str | int, columns: Sequence[Column], key: str) -> Column:
-    """Return the column of a number or heading."""
+    """Return the column with a number or heading."""
     labels = [column.label for column in columns]
     if wanted in labels:
         return columns[labels.index(str(wanted))]
@@ -70,7 +70,7 @@ def _find(wanted: str | int, columns: Sequence[Column], key: str) -> Column:
 
 
 def _with_time_column(tables: Sequence[Table], wanted: str | int, numbered: Sequence[Column]) -> list[Table]:
-    """Return the tables with another column as that of their instants, or with none."""
+    """Return the tables with another column of instants, or with none."""
     chosen = None if wanted == NO_COLUMN else _find(wanted, numbered, "time_column")
     found = []
     for table in tables:
