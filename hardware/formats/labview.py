@@ -72,8 +72,7 @@ def read_labview(content: str) -> RawFile:
 
 
 def _without_special_blocks(lines: Sequence[str]) -> tuple[list[str], int]:
-    """Return the lines without blocks of other programs (***Start_Special*** to ***End_Special***), and their
-    count."""
+    """Return the lines outside blocks of other programs (`***Start_Special***` and on), and the number of blocks."""
     kept, blocks, inside = [], 0, False
     for line in lines:
         if line.startswith("***Start_Special***"):

@@ -28,10 +28,10 @@ _LONG_AGO, _NEVER = -(2**60), 2**60
 class PulseFinder:
     """Finds pulses in arriving samples, independent of their division into blocks.
 
-    A pulse begins where the channel passes the threshold, and ends where it has come back below a part of it
-    (`hysteresis`), so that noise does not split it. A new crossing within the dead time from its start, such as the
-    ringing of a load cell, belongs to it. Kept samples are those of pulses, up to `before` and `after` them, and in
-    the dead time, each once.
+    A pulse begins where the channel passes the threshold. It ends where the channel is back below a part of the
+    threshold (`hysteresis`), so that noise does not split it. A new crossing within the dead time from its start, such
+    as the ringing of a load cell, belongs to it. Kept samples are those of pulses, up to `before` and `after` them,
+    and in the dead time, each once.
 
     After `most` pulses it is `done`, once all of the last one is kept. `starts` has the number of the first sample of
     each pulse beyond the threshold.

@@ -19,8 +19,7 @@ _BACK_BY = 3.0
 
 
 def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:
-    """Return tables joined if they continue each other in time, and remarks; the time axis handles gaps between
-    them."""
+    """Return tables joined if they continue each other in time, and remarks; the time axis handles gaps."""
     result: list[Table] = []
     remarks: list[str] = []
     for table in tables:

@@ -1,4 +1,4 @@
-"""Attributes that a program can change, and how: by NI's numbers; every other one is refused."""
+"""Attributes that a program can change, by NI's numbers; all others are refused."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _CLOCK_FIELDS = {0x1344: "rate", 0x1300: "mode", 0x1310: "samples", 0x1852: "sou
 
 
 _WHILE_RUNNING = {("Read", 0x190A), ("Read", 0x190B)}
-"""Where a read begins may be said before each."""
+"""Attributes that may change while a task runs: the origin and offset of a read."""
 
 
 def change(group: str, task: Task, number: int, value: Any) -> None:
@@ -107,14 +107,14 @@ _DEFAULTS: dict[tuple[str, int], Any] = {
 
 
 def reset(group: str, task: Task, number: int) -> None:
-    """Give an attribute of a task its default again."""
+    """Reset an attribute of a task to its default."""
     if (group, number) not in _DEFAULTS:
         raise unknown(group, number)
     change(group, task, number, _DEFAULTS[group, number])
 
 
 def change_channel(board: Board, task: Task, names: str, number: int, value: Any) -> None:
-    """Change an attribute of channels: the range of the device, the voltages that are expected, the wiring."""
+    """Change an attribute of channels: the device range, the expected voltages, the terminal configuration."""
     task.refuse_running()
     changes = _OF_INPUTS if task.kind == INPUT else _OF_OUTPUTS
     if number not in changes:
@@ -178,7 +178,7 @@ def _one_of(ranges: tuple[float, ...], edge: float) -> float:
 
 
 def input_range(board: Board, low: float, high: float) -> float:
-    """Return the range of the device for inputs from `low` to `high`, V."""
+    """Return the device range for inputs from `low` to `high`, V."""
     chosen = board.profile.input_range(low, high)
     if not low < high or chosen is None:
         raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a range of {low:g} to {high:g} V")
@@ -186,14 +186,14 @@ def input_range(board: Board, low: float, high: float) -> float:
 
 
 def refuse_output_range(board: Board, low: float, high: float) -> None:
-    """Refuse voltages that the outputs of the device do not have."""
+    """Raise Refusal for voltages outside the output range of the device."""
     widest = board.profile.output_range
     if not -widest <= low < high <= widest:
         raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a range of {low:g} to {high:g} V")
 
 
 def wiring(asked: int) -> int:
-    """Return a terminal configuration; the plant is the same behind each."""
+    """Return a terminal configuration; the plant is the same for all of them."""
     modes = constants.TerminalConfiguration
     if asked == modes.DEFAULT.value:
         asked = modes.DIFF.value
