@@ -24,8 +24,8 @@ class ScenePlant:
     """A scene that runs for as long as the rig is served.
 
     The time reached is `now`, in ticks, and `state` the voltages of its channels then. A wrong scene raises
-    SceneError, one that cannot be a plant UsageError: a chain, components, a replay, a moving base, or one without a
-    wired channel.
+    SceneError. A scene that cannot be a plant raises UsageError: a chain, components, a replay, a moving base, or one
+    without a wired channel.
     """
 
     def __init__(self, settings: RigSettings) -> None:
