@@ -170,7 +170,7 @@ class _Keeper:
             self._acquired.stop()
 
     def _reason(self, block: Block) -> str:
-        """Return the reason for an early end; empty if the measurement goes on."""
+        """Return the reason for an early end; empty if the measurement continues."""
         journal = self._store.journal
         if self._store.failure:
             return f"the journal cannot be written: {self._store.failure}"

@@ -64,7 +64,7 @@ class Watch:
                 since = now
 
     def _said(self, seconds: float) -> str | None:
-        """Return the meaning of the program's end or message; None if it goes on."""
+        """Return the meaning of the program's end or message; None if it continues."""
         if os.getppid() != self._order.program:
             return "has ended"
         if not select.select([0], [], [], seconds)[0]:

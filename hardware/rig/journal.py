@@ -48,7 +48,7 @@ _HEAD = struct.Struct("<4sIQI")
 _HEADER, _SAMPLES, _NOTE = b"HEAD", b"SAMP", b"NOTE"
 _LONGEST_HEADER = 2**20
 LAST_SAMPLE = 2**52
-"""Largest number of a sample: larger numbers cannot be told apart as instants."""
+"""Largest number of a sample: the instants of larger numbers are not distinct."""
 _MOST_LOOKED = 2**31
 """Most bytes searched in damaged records, checksums and searches together; the rest of the file counts as lost.
 

@@ -165,7 +165,7 @@ class Capabilities:
     tool : str
         The required tool; empty without one.
     asynchronous : bool
-        Its steps may go on after they have returned.
+        Its step calls may return before the step is done.
     clocks : tuple of InputClock
         Its input clocks with known ticks.
     refusals : tuple of str

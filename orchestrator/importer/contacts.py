@@ -115,7 +115,7 @@ class ContactBonds:
             bond.apply()
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         open_pairs = [pair for pair in self.pairs.pairs if not pair.closed]
         pressed = [bond for bond in self._following if bond not in open_pairs]
         # free pairs are checked once all forces agree

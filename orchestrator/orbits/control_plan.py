@@ -97,7 +97,7 @@ class ControlPlan:
     orbits: list[PeriodicOrbit]
     """One orbit at each angular frequency."""
     ends_at: float | None
-    """Angular frequency at which the branch ends, rad/s; None if it goes on beyond the plan."""
+    """Angular frequency at which the branch ends, rad/s; None if it continues beyond the plan."""
 
     @property
     def rows(self) -> list[dict[str, Any]]:

@@ -47,7 +47,7 @@ ACCUMULATED = 1e-3
 #: Closing speed times duration of a bounce, in touching distances, below which there is no bounce.
 LOW = 64.0
 #: Duration over the longest step, and closing speed over the largest speed: a bounce is small with both below this
-#: part. After so many small bounces in a row elastic bodies are pressed together.
+#: part. After `MOST_SMALL_BOUNCES` of them in a row elastic bodies are pressed together.
 SMALL = 1e-3
 MOST_SMALL_BOUNCES = 1000
 #: Distance of bodies at rest on each other, relative to the largest displacement, above which a remark reports it.
@@ -202,7 +202,7 @@ class Pair:
             self._pressed = self._force.value != 0.0
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         if not self.closed:
             return None if self._pulses.under_way else self._meeting(time, end)
         if not self.yields:

@@ -202,7 +202,7 @@ class ContactBond:
             self._line.set()
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         if not (self.active and self.revisable):
             return None
         now = self.look()

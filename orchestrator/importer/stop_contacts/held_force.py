@@ -156,7 +156,7 @@ class HeldForceBond:
         self._input.write()
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         if not (self.revisable and end > time):
             return None
         path = self._path(end - time)

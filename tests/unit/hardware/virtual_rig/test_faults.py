@@ -110,7 +110,7 @@ def test_a_server_that_is_gone_ends_the_read_that_waits() -> None:
 
 
 def drift_of_clock(bench: Bench, rate: float, count: int) -> float:
-    """Return how fast the input clock is, ppm, from the phase of a looped sine against its sample index."""
+    """Return the error of the input clock, ppm, from the phase of a looped sine over its sample index; > 0: fast."""
     cycles = 1.0 / 50.0
     wave = 5.0 * np.sin(2.0 * np.pi * cycles * np.arange(50))
     with (
