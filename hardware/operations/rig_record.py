@@ -34,7 +34,7 @@ class Record(Operation):
     loopback: Annotated[
         list[str] | None,
         Option(
-            help="The same of an input to which an output is wired.",
+            help="Input to which an output is wired, and its range in V.",
             metavar="NAME=TERMINAL[,RANGE]",
             python="loopback: Sequence[str] = ()",
         ),

@@ -18,12 +18,13 @@ class Recover(Operation):
     journal: Annotated[
         Path,
         Positional(
-            help="Journal of a measurement that died.",
+            help="Journal of an aborted measurement.",
             metavar="REC.journal",
             python="journal: str | os.PathLike[str]",
         ),
     ]
     output: Annotated[
-        Path | None, Option("--output", "-o", help="Recording to write; else REC.nc beside it.", python="")
+        Path | None,
+        Option("--output", "-o", help="Recording to write; by default REC.nc beside the journal.", python=""),
     ] = None
     force: Force = False

@@ -31,7 +31,7 @@ class MeasureSweep(Operation):
         Option(
             "--output",
             "-o",
-            help="Folder of its dataset.",
+            help="Folder of the dataset.",
             metavar="FOLDER",
             python="folder: str | os.PathLike[str]",
         ),
@@ -39,5 +39,7 @@ class MeasureSweep(Operation):
     rig: RigChoice = None
     dry_run: Annotated[
         bool,
-        Option("--dry-run", help="Draw the planned output, say how long it takes, drive nothing.", python=""),
+        Option(
+            "--dry-run", help="Draw the planned output and print its duration without driving it.", python=""
+        ),
     ] = False

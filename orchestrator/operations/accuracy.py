@@ -23,18 +23,17 @@ class Accuracy(Operation):
     scene: SceneFile
     output: DatasetFile = None
     figure: FigureFile = None
-    tolerance: Annotated[
-        float | None, Option(help="Relative error for which the cheapest way is looked for.")
-    ] = None
+    tolerance: Annotated[float | None, Option(help="Relative error that the cheapest way must reach.")] = None
     of: Annotated[
         str,
         Option(
-            help="What errors are of: impact_time, impact_velocity, displacement_range, final_state, samples; or all."
+            help="Compared result: impact_time, impact_velocity, displacement_range, final_state, samples; or all."
         ),
     ] = "all"
     write: Annotated[
-        Path | None, Option(help="Scene file (TOML) to write, with the way that reaches the tolerance.")
+        Path | None,
+        Option(help="Scene file (TOML) to write, with the cheapest way that reaches the tolerance."),
     ] = None
-    budget: Annotated[float, Option(help="Processor time to spend, of all processes, s; at least 10.")] = 40.0
+    budget: Annotated[float, Option(help="Processor time of all processes, s; at least 10.")] = 40.0
     changes: Changes = None
     force: Force = False

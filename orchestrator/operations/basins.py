@@ -24,7 +24,7 @@ class Basins(Operation):
         Option(
             metavar="LOW:HIGH",
             python="x: Span | None = None",
-            help="Displacements at the start (m); twice the scene's own.",
+            help="Displacements at the start (m); by default up to twice the size of the scene's motion.",
         ),
     ] = None
     y: Annotated[
@@ -32,7 +32,7 @@ class Basins(Operation):
         Option(
             metavar="LOW:HIGH",
             python="y: Span | None = None",
-            help="Velocities at the start (m/s); twice the scene's own.",
+            help="Velocities at the start (m/s); by default up to twice the size of the scene's motion.",
         ),
     ] = None
     points: Annotated[
@@ -43,7 +43,7 @@ class Basins(Operation):
     ] = "200"
     number: Annotated[
         int | None,
-        Option(help="Mass of a chain (the one that is hit first) or mode of a beam (1) that starts so."),
+        Option(help="Mass of a chain (first impacting one) or mode of a beam (1) with these starts."),
     ] = None
     output: DatasetFile = None
     figure: FigureFile = None

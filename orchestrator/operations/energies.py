@@ -25,8 +25,8 @@ class Energies(Operation):
     file: SceneOrDataset
     output: DatasetFile = None
     figure: FigureFile = None
-    run: Annotated[int | None, Option(help="run_index of one run, of which each impact is told.", min=0)] = (
-        None
-    )
+    run: Annotated[
+        int | None, Option(help="run_index of a run whose impacts are listed one by one.", min=0)
+    ] = None
     changes: Changes = None
     force: Force = False

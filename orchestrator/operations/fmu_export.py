@@ -44,10 +44,10 @@ class ExportFmu(Operation):
             "may be repeated.",
         ),
     ] = None
-    contacts: Annotated[int | None, Option(help="Contacts in its description.")] = None
-    modes: Annotated[int | None, Option(help="Beam: modes in its description.")] = None
-    masses: Annotated[int | None, Option(help="Chain: masses, likewise.")] = None
-    sensors: Annotated[int | None, Option(help="Beam: sensors, likewise.")] = None
+    contacts: Annotated[int | None, Option(help="Number of contacts in its description.")] = None
+    modes: Annotated[int | None, Option(help="Beam: number of modes in its description.")] = None
+    masses: Annotated[int | None, Option(help="Chain: number of masses in its description.")] = None
+    sensors: Annotated[int | None, Option(help="Beam: number of sensors in its description.")] = None
     fmi: Annotated[str, Option(help="FMI version, 3.0 or 2.0.")] = "3.0"
     full: Annotated[
         bool,
@@ -57,17 +57,17 @@ class ExportFmu(Operation):
         Literal["external"] | None,
         Option(
             python="external: bool = False",
-            help="external: describe what a tool needs that answers contacts itself.",
+            help="external: describe the variables for a tool with contact laws of its own.",
         ),
     ] = None
-    enumerations: Annotated[
-        bool, Option("--enumerations", help="Keep enumerations; else they are integers.")
-    ] = False
+    enumerations: Annotated[bool, Option("--enumerations", help="Keep enumerations instead of integers.")] = (
+        False
+    )
     platform: Annotated[
         str | None,
         Option(
-            help="Machines it is for: all, or names such as x86_64-windows,x86_64-linux. Needs the extra cross where "
+            help="Target machines: all, or names such as x86_64-windows,x86_64-linux. Needs the extra cross where "
             "this release has no libraries for them."
         ),
     ] = None
-    law: Annotated[Path | None, Option(help="user-contact-law: the Python file of your law.")] = None
+    law: Annotated[Path | None, Option(help="user-contact-law: the Python file of the law.")] = None

@@ -22,7 +22,7 @@ class HardCases(Operation):
         Option(
             metavar="NAME",
             python="only: str | Sequence[str] = ()",
-            help="A case to run; may be repeated. All without it.",
+            help="Case to run, by default all; may be repeated.",
         ),
     ] = None
     output: DatasetFile = None

@@ -34,12 +34,16 @@ class Maps(Operation):
     kind: Annotated[
         str, Option(help="impact, strobe, discontinuity (sets S and W), nordmark, square-root.")
     ] = "impact"
-    start: Annotated[float | None, Option("--from", help="Of rho or d: one end of its range.")] = None
-    stop: Annotated[float | None, Option("--to", help="The other end.")] = None
-    points: Annotated[int, Option(help="Values in that range; phases of the grazes of S and W.")] = 1500
-    alpha: Annotated[float | None, Option(help="Of the Nordmark map, instead of the scene's.")] = None
-    gamma: Annotated[float | None, Option(help="Likewise.")] = None
-    restitution: Annotated[float | None, Option(help="Likewise (1).")] = None
+    start: Annotated[float | None, Option("--from", help="First end of the range of rho or d.")] = None
+    stop: Annotated[float | None, Option("--to", help="Second end of the range.")] = None
+    points: Annotated[
+        int, Option(help="Number of values in that range, or of grazing phases of S and W.")
+    ] = 1500
+    alpha: Annotated[float | None, Option(help="alpha of the Nordmark map, instead of the scene's.")] = None
+    gamma: Annotated[float | None, Option(help="gamma of the Nordmark map, instead of the scene's.")] = None
+    restitution: Annotated[
+        float | None, Option(help="Restitution of the Nordmark map, instead of the scene's (1).")
+    ] = None
     slope: Annotated[float | None, Option(help="lambda of the square-root map (0.5).")] = None
     output: DatasetFile = None
     figure: FigureFile = None

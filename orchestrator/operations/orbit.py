@@ -26,7 +26,7 @@ class FindOrbits(Operation):
     from_dataset: FromDataset = None
     run: Run = None
     penetrating: Annotated[
-        bool, Option("--penetrating", help="Tell orbits that pass through a stop as well.")
+        bool, Option("--penetrating", help="Also report orbits that pass through a stop.")
     ] = False
     output: DatasetFile = None
     figure: FigureFile = None

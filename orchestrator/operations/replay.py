@@ -28,7 +28,7 @@ class Replay(Operation):
         list[Path] | None,
         Positional(
             python="recordings: PathLike | Sequence[PathLike] = ()",
-            help="Recordings to replay, and to fit to; left out, those that the scene names.",
+            help="Recordings to replay and to fit to; by default those that the scene names.",
         ),
     ] = None
     output: Annotated[
@@ -37,7 +37,7 @@ class Replay(Operation):
             "--output",
             "-o",
             python="path: PathLike | None = None",
-            help="Dataset to write (.nc); of a campaign its folder.",
+            help="Dataset to write (.nc), or the folder of a campaign.",
         ),
     ] = None
     fit: Annotated[
@@ -51,17 +51,17 @@ class Replay(Operation):
         list[Path] | None,
         Option(
             python="score: PathLike | Sequence[PathLike] = ()",
-            help="Recording to score that was not fitted on; may be repeated.",
+            help="Recording that is compared but not used in the fit; may be repeated.",
         ),
     ] = None
     save_scene: Annotated[
         Path | None,
-        Option(help="Scene to write with the numbers found (.toml); one that is there only with --force."),
+        Option(help="Scene to write with the fitted numbers (.toml); an existing one only with --force."),
     ] = None
     figure: FigureFile = None
     execution: Annotated[
         str | None,
-        Option(help="auto, fused, or coupled (a Replay FMU drives); else as the scene says."),
+        Option(help="auto, fused, or coupled (driven by a Replay FMU); by default as the scene says."),
     ] = None
     workers: Annotated[int | None, Option(help="Worker processes of a campaign.", min=1)] = None
     scheduler: Annotated[str | None, Option(help="Dask scheduler of a campaign.")] = None

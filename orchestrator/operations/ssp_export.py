@@ -34,10 +34,8 @@ class ExportSsp(Operation):
     gains: Annotated[
         str,
         Option(
-            help="A gain is a component with units of its own, or a transformation of its connection: without delay "
+            help="A gain is a component with its own units, or a transformation of its connection: without delay "
             "where values are exchanged once a step, but OMSimulator leaves it out."
         ),
     ] = "component"
-    platform: Annotated[
-        str | None, Option(help="Machines it is for, as `vibroimpact fmu export` has them.")
-    ] = None
+    platform: Annotated[str | None, Option(help="Target machines, as in `vibroimpact fmu export`.")] = None

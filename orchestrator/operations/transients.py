@@ -22,13 +22,13 @@ class TransientsOf(Operation):
     scene: SceneFile
     output: DatasetFile = None
     figure: FigureFile = None
-    starts: Annotated[int, Option(help="Starts beside that of the scene.")] = 8
+    starts: Annotated[int, Option(help="Number of starts besides that of the scene.")] = 8
     spread: Annotated[
-        float, Option(help="Largest distance of these starts, over the size of the scene's motion.")
+        float, Option(help="Largest distance of these starts, relative to the size of the scene's motion.")
     ] = 1.0
-    tolerance: Annotated[float, Option(help="Distance over that size below which a start is forgotten.")] = (
-        1e-6
-    )
-    periods: Annotated[int, Option(help="Most periods that are followed.")] = 3000
+    tolerance: Annotated[
+        float, Option(help="Distance, relative to that size, below which a start is forgotten.")
+    ] = 1e-6
+    periods: Annotated[int, Option(help="Maximum number of periods.")] = 3000
     changes: Changes = None
     force: Force = False
