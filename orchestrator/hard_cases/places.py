@@ -106,7 +106,7 @@ def _rocking() -> Found:
         assert record.final_state is not None
         errors.append(float(np.abs(record.final_state).max()))
     off = np.array(errors)
-    return Found(largest(off), Curve(loads, off, "load (-)", "what is left of the motion (-)", x_log=True))
+    return Found(largest(off), Curve(loads, off, "load (-)", "residual motion (-)", x_log=True))
 
 
 BESIDE = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
@@ -162,8 +162,8 @@ CASES = (
     HardCase(
         "stop-at-a-node",
         THEME,
-        "a stop at the node of a chain that swings",
-        "changes nothing",
+        "a stop at a node of a swinging chain",
+        "does not change the motion",
         "closed form",
         "relative error of the motion",
         1e-12,
@@ -172,8 +172,8 @@ CASES = (
     HardCase(
         "beside-a-node",
         THEME,
-        "a stop 1e-15 to 1e-9 of the length beside a node of the mode that swings",
-        "the first six impacts of the motion that is left there",
+        "a stop 1e-15 to 1e-9 of the length off a node of the swinging mode",
+        "the first six impacts of the residual motion there",
         "both modes in closed form",
         "relative error of times and speeds",
         2e-14,
@@ -182,8 +182,8 @@ CASES = (
     HardCase(
         "driven-at-a-node",
         THEME,
-        "a symmetric force on a symmetric chain, one stop on one side",
-        "the masses move alike until the first impact",
+        "a symmetric force on a symmetric chain, a stop on one side",
+        "the masses move equally until the first impact",
         "symmetry",
         "asymmetry before the impact",
         1e-14,
@@ -192,10 +192,10 @@ CASES = (
     HardCase(
         "starts",
         THEME,
-        "on the stop from the start, moving into it, pulled off it, pressed to it",
-        "an impact at time 0; leaves without one; holds",
+        "on the stop at the start: moving into it, pulled off it, pressed to it",
+        "an impact at time 0; leaves without impact; stays",
         "closed forms",
-        "error of time, speed or place",
+        "error of time, speed or position",
         9e-16,
         _starts,
     ),
@@ -205,7 +205,7 @@ CASES = (
         "a beam of two modes that a load of 1e-3 to 1e3 presses to two dead stops",
         "comes to rest on both after infinitely many impacts",
         "statics",
-        "what is left of the motion",
+        "residual motion",
         9e-16,
         _rocking,
     ),

@@ -198,7 +198,7 @@ TURNS = 10
 def _pressed_in_turn() -> Found:
     """A free mass that cos(t) presses to two stops in turn: distance of its impacts from the stops."""
     off = np.array([[_off_turns(float(room), r) for r in (0.3, 0.8)] for room in ROOMS]).max(axis=1)
-    curve = Curve(ROOMS, off, "room (-)", "error of impacts and rests as a way (-)", x_log=True)
+    curve = Curve(ROOMS, off, "gap (-)", "error of impacts and rests as a distance (-)", x_log=True)
     return Found(largest(off), curve)
 
 
@@ -298,8 +298,8 @@ CASES = (
     HardCase(
         "pressed-beam",
         THEME,
-        "a beam of 6 modes pressed to its stop, chatter and all",
-        "comes to rest; the force of the stop",
+        "a beam of 6 modes pressed to its stop after chatter",
+        "comes to rest; the force at the stop",
         "static flexibility of its modes",
         "relative error of the force at the end",
         1.7e-13,
@@ -308,7 +308,7 @@ CASES = (
     HardCase(
         "turning-load",
         THEME,
-        "a load that turns round at 1e-3 to 1e3 rad/s",
+        "a load that changes sign at 1e-3 to 1e3 rad/s",
         "the mass lifts off at that instant",
         "zero of the load",
         "relative error of the time",
@@ -319,7 +319,7 @@ CASES = (
         "undamped-rest",
         THEME,
         "an undamped beam of 4 modes at rest on a dead stop, in 1000 steps",
-        "the motion of the rest of it keeps its energy",
+        "the remaining motion keeps its energy",
         "conservation",
         "relative error of the energy",
         3e-13,
@@ -338,30 +338,30 @@ CASES = (
     HardCase(
         "end-at-release",
         THEME,
-        "bounces that end as their load turns round; starts 1e-12 to 1e-2 beside that",
+        "bounces that end as their load changes sign; starts off by 1e-12 to 1e-2",
         "come to rest before the release, or leave; the motion after it",
-        "flights in closed form, followed back from the release",
-        "relative error of impacts, rest, release and end",
+        "flights in closed form, backwards from the release",
+        "relative error of impacts, rest, release and final state",
         7e-13,
         _end_at_release,
     ),
     HardCase(
         "pressed-in-turn",
         THEME,
-        "a load that presses a mass to two stops in turn, 1e-3 to 1e-12 apart",
-        "crosses the room at each turn, and bounces to rest",
+        "a load that presses a mass alternately to two stops 1e-3 to 1e-12 apart",
+        "crosses the gap at each change of sign, and bounces to rest",
         "flights in closed form",
-        "error of times as a way, over the way of the load",
+        "error of times as a distance, relative to that of the load",
         5e-14,
         _pressed_in_turn,
     ),
     HardCase(
         "fourth-order",
         THEME,
-        "a stop whose force is 0 together with its slope, or 1e-12 to 1e-3 beside that",
-        "the body leaves by the fourth power of time; or it stays, where the force only touches 0",
+        "a stop force that is 0 with zero slope, or off by 1e-12 to 1e-3",
+        "the body leaves with the fourth power of time; or it stays, if the force only touches 0",
         "closed form; statics",
-        "relative error of the next impact, or of the place of rest",
+        "relative error of the next impact, or of the rest position",
         9e-14,
         _fourth_order,
     ),

@@ -72,7 +72,7 @@ def _one_step() -> Found:
     off = np.array(errors)
     return Found(
         float(off[-1]),
-        Curve(PERIODS, off, "periods in one step (-)", "relative error of the end (-)", x_log=True),
+        Curve(PERIODS, off, "periods in one step (-)", "relative error of the final state (-)", x_log=True),
     )
 
 
@@ -112,7 +112,7 @@ def _samples() -> Found:
     off = np.array([max(np.abs(state - reference).max() / scale, drift) for state, drift in ends])
     return Found(
         largest(off),
-        Curve(RATES[1:], off, "samples a second (-)", "energy, change of the end (-)", x_log=True),
+        Curve(RATES[1:], off, "samples per second (-)", "energy, change of the final state (-)", x_log=True),
     )
 
 
@@ -156,7 +156,7 @@ CASES = (
         "displacements of 1e-9 to 1e9",
         "the same motion on rigid and yielding stops",
         "the motion at 1",
-        "relative change of the state at the end",
+        "relative change of the final state",
         1.6e-13,
         _units,
     ),
@@ -166,17 +166,17 @@ CASES = (
         "one step of 100 to 10^6 periods",
         "ends in the steady motion",
         "closed form",
-        "relative error of the end after 10^6 periods",
+        "relative error of the final state after 10^6 periods",
         5e-15,
         _one_step,
     ),
     HardCase(
         "samples",
         THEME,
-        "an undamped free beam, 0 to 97 samples a second for 1000 s",
-        "the same end, the energy kept",
+        "an undamped free beam, 0 to 97 samples per second for 1000 s",
+        "the same final state, the energy is conserved",
         "the run without samples; conservation",
-        "relative change of the end, or of the energy",
+        "relative change of the final state, or of the energy",
         1e-11,
         _samples,
     ),
@@ -184,7 +184,7 @@ CASES = (
         "many-modes",
         THEME,
         "undamped beams of 1 to 64 modes between elastic stops",
-        "outside of the stops, the energy kept",
+        "stays outside of the stops, the energy is conserved",
         "conservation",
         "relative distance beyond the stops, or error of the energy",
         2e-12,

@@ -150,7 +150,7 @@ def _pressed_between() -> Found:
         errors.append(abs(record.final_displacement - 1e-6 - depth) / depth)
     off = np.array(errors)
     return Found(
-        largest(off), Curve(LOADS, off, "load (-)", "relative error of the place at the end (-)", x_log=True)
+        largest(off), Curve(LOADS, off, "load (-)", "relative error of the final position (-)", x_log=True)
     )
 
 
@@ -159,7 +159,7 @@ CASES = (
         "all-laws",
         THEME,
         "a chain with a stop of each law, 20 periods",
-        "energy is balanced",
+        "the energy balance holds",
         "balance",
         "relative error of the balance",
         1.7e-13,
@@ -169,7 +169,7 @@ CASES = (
         "uneven-beam",
         THEME,
         "a beam of 8 modes, undamped to overdamped, four stops of three laws",
-        "energy is balanced",
+        "the energy balance holds",
         "balance",
         "relative error of the balance",
         2.6e-13,
@@ -178,8 +178,8 @@ CASES = (
     HardCase(
         "rest-beside",
         THEME,
-        "a beam that rests on a dead stop while a Hunt-Crossley stop lets go",
-        "comes to an end, energy balanced",
+        "a beam at rest on a dead stop while a Hunt-Crossley stop releases it",
+        "finishes, the energy balance holds",
         "balance",
         "relative error of the balance",
         6e-13,
@@ -189,7 +189,7 @@ CASES = (
         "overdamped",
         THEME,
         "an undamped stop under an overdamped mode",
-        "gives its energy back",
+        "returns its energy",
         "balance",
         "relative error of the balance",
         1.3e-13,
@@ -199,7 +199,7 @@ CASES = (
         "behind",
         THEME,
         "a rigid stop behind a spring",
-        "both are met, and both let go",
+        "the mass meets both, and leaves both",
         "conservation of energy",
         "relative error of the speeds",
         4e-15,
@@ -208,10 +208,10 @@ CASES = (
     HardCase(
         "pressed-between",
         THEME,
-        "a load of 0.1 to 1e3 N on a power law opposite a rigid stop 1e-6 m off",
-        "is pressed in to its static place",
+        "a load of 0.1 to 1e3 N on a power law, opposite a rigid stop at 1e-6 m",
+        "is compressed to its static position",
         "statics",
-        "relative error of the place",
+        "relative error of the position",
         6e-12,
         _pressed_between,
     ),
