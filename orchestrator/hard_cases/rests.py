@@ -1,4 +1,4 @@
-"""Chatter, sticking, release: beams that come to rest, loads that turn round, long rests."""
+"""Chatter, sticking, release: beams that come to rest, loads that change sign, long rests."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def _uneven_beam() -> Found:
 
 
 def _rest_beside() -> Found:
-    """A pinned beam rests on a dead stop while an opposite Hunt-Crossley stop is pressed in, and lets go."""
+    """A pinned beam rests on a dead stop while an opposite Hunt-Crossley stop is pressed in and released."""
     return _balanced(
         5,
         {"recorded_time": 12.0},

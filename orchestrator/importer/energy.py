@@ -133,7 +133,7 @@ class _Contact:
             self.residual += (finish - begin) * float(np.sum(WEIGHTS * self._power(time, end, way)))
 
     def _kinks(self, time: float, size: float) -> list[float]:
-        """Return the seconds into the step at which the body lets go of the stop, and reaches its surface again."""
+        """Return the times (s) from the start of the step to the separation from the stop and to its surface."""
         bond = self._bond
         kinks = []
         if bond.start.force > 0.0 and not self._felt(time, size)[3] > 0.0:

@@ -349,7 +349,7 @@ class Pair:
         )
 
     def is_pressed(self, now: Motion, time: float) -> bool:
-        """Have the bodies sunk into each other, or made many small bounces in a row?"""
+        """Return whether the bodies overlap, or have made many successive small bounces."""
         is_sunk = now.gap < -SUNK * self._scale.room(time) and not self._force.resting
         return is_sunk or self._small_bounces > MOST_SMALL_BOUNCES
 

@@ -242,7 +242,7 @@ class ContactBond:
         missed = now.force - max(0.0, start.force_at(now.penetration, now.rate))
         if self._corrected or (abs(missed) <= FORCE_TOLERANCE * self._largest_force and not lets_go):
             return False
-        # at touch-down the point may be a rounding inside: a line bent there may let go at once
+        # at touch-down the point may be a rounding inside: a line bent there may separate at once
         if start.force > FORCE_TOLERANCE * self._largest_force and now.force > 0.0:
             self._bend(now)
         elif now.force > 0.0:
@@ -254,7 +254,7 @@ class ContactBond:
         return True
 
     def _bend(self, now: _Answer) -> None:
-        """Set the line with the mean of the stop's force, parallel to the chord unless that would let go too early."""
+        """Set the line with the mean of the stop's force, parallel to the chord unless that separates too early."""
         start = self.start
         first, last, mean = start.force, now.force, self._mean(now)
         moved, sped = now.penetration - start.penetration, now.rate - start.rate
@@ -283,7 +283,7 @@ class ContactBond:
     def _lets_go_at_surface(self, now: _Answer) -> bool:
         """On the way out, end the line at the surface with the work of a power of the penetration.
 
-        A spring and a dashpot let go before the surface, as their straight line gives.
+        A spring and a dashpot separate before the surface, as their straight line gives.
         """
         start = self.start
         elastic = start.force - start.damping * start.rate
