@@ -62,8 +62,8 @@ def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
     names, remarks = _chosen(schema)
     if not names:  # an empty selection would mean all fields
         return pyarrow.table({}), remarks
-    wanted = pyarrow.ipc.IpcReadOptions(included_fields=[schema.get_field_index(name) for name in names])
-    with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path)), options=wanted) as file:
+    options = pyarrow.ipc.IpcReadOptions(included_fields=[schema.get_field_index(name) for name in names])
+    with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path)), options=options) as file:
         rows, batches = 0, []
         for at in range(file.num_record_batches):
             batches.append(file.get_batch(at))

@@ -170,7 +170,7 @@ def _with_days(days: Sequence[str], clock: Sequence[str], dates: str) -> Column 
     cells = [f"{day.strip()} {time.strip()}".strip() for day, time in zip(days, clock, strict=True)]
     column = read_instants(cells, is_marker, dates)
     known = column.values[np.isfinite(column.values)]
-    is_clear = not column.strange and not column.doubt and len(known) > 1
+    is_clear = not column.strange and not column.ambiguity and len(known) > 1
     return column if is_clear and bool(np.all(np.diff(known) >= 0.0)) else None
 
 

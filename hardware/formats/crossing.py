@@ -13,7 +13,7 @@ import numpy as np
 from vibroimpact.fmus.messages import Message, typed
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 
-_PLAIN = ("label", "unit", "interval", "start", "group", "dated", "doubt")
+_PLAIN = ("label", "unit", "interval", "start", "group", "dated", "ambiguity")
 _KINDS = "fiub"
 _COMPLEX_KINDS = "fiubc"
 _ARRAY = "array"

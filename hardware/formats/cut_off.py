@@ -15,7 +15,7 @@ from vibroimpact.hardware.formats.instants import is_date
 _ROWS_COMPARED = 1000
 _FEWEST_ALIKE = 8
 _LONGEST_QUOTE = 40
-_LOST = "nan"
+_MISSING = "nan"
 # equally many digits in each cell: those after the decimal sign, and two or more of an exponent
 _FIXED = re.compile(r"9+(?:[eEdD][-+]99+)?Z?", re.ASCII)
 _EXPONENT = re.compile(r"\d[eEdD][-+]?\d", re.ASCII)
@@ -40,8 +40,8 @@ def without_cut_cells(
         return kept, []
     cells = _filled(split_line(kept[-1], delimiter))
     if not cells:  # a row of missing values, or a quotation mark that opens the first value
-        begun = '"' in kept[-1]
-        return kept[:-1] if begun else kept, [_left_out(kept[-1])] if begun else []
+        is_open = '"' in kept[-1]
+        return kept[:-1] if is_open else kept, [_left_out(kept[-1])] if is_open else []
     above = [split_line(row, delimiter) for row in kept[-1 - _ROWS_COMPARED : -1]]
     before = _filled(above[-1]) if above else cells
     column = [row[len(cells) - 1] for row in above if len(row) >= len(cells)]
@@ -60,10 +60,10 @@ def without_cut_cells(
     whole = cells if alike else cells[:-1]
     if not any(whole):
         return kept[:-1], [_left_out(cells[-1])]
-    lost = [_LOST if cell else "" for cell in before[len(whole) :]] or [_LOST]
+    missing = [_MISSING if cell else "" for cell in before[len(whole) :]] or [_MISSING]
     if decimal == delimiter:  # quotes keep them apart
         whole = [f'"{cell}"' for cell in whole]
-    kept[-1] = (" " if delimiter is None else delimiter).join([*whole, *lost])
+    kept[-1] = (" " if delimiter is None else delimiter).join([*whole, *missing])
     what = "its last columns count" if alike else f"its last value, {_quote(cells[-1])}, counts"
     return kept, [f"the text ends within a row: {what} as missing"]
 

@@ -61,10 +61,10 @@ def _hdf5(path: os.PathLike[str] | str) -> Iterator[_Variable]:
         for name, variable in file.variables.items():
             numeric = getattr(variable.dtype, "kind", "O") in "fiu" and len(variable.dimensions) == 1
             # the library warns of a meaningless scale or fill value, and continues without it
-            with warnings.catch_warnings(record=True) as said:
+            with warnings.catch_warnings(record=True) as warned:
                 warnings.simplefilter("always")
                 values = np.ma.asarray(variable[...], dtype=np.float64).filled(np.nan) if numeric else None
-            yield _variable(name, variable, values, "; ".join({str(warning.message) for warning in said}))
+            yield _variable(name, variable, values, "; ".join({str(warning.message) for warning in warned}))
 
 
 def _check_sizes(sizes: list[int]) -> None:

@@ -158,8 +158,8 @@ def read_instants(cells: Sequence[str], is_marker: Callable[[str], bool], order:
     """Return cells of dates and times of day as seconds after the first one.
 
     Dates such as 02/03/2019 may be valid with the day first and with the month first. If the two orders give different
-    instants, `doubt` of the column reports it. `is_marker` recognises cells of missing samples. `order` is `day-first`
-    or `month-first`; empty: found from the dates.
+    instants, `ambiguity` of the column reports it. `is_marker` recognises cells of missing samples. `order` is
+    `day-first` or `month-first`; empty: found from the dates.
     """
     read = _read(cells, is_marker, order or DAY_FIRST)
     known = _seconds(read.stamps, cells)
@@ -175,13 +175,13 @@ def read_instants(cells: Sequence[str], is_marker: Callable[[str], bool], order:
     if len(fitting) == 1:
         return _column(*fitting[0])
     first = next(cell.strip() for cell in cells if is_date(cell))
-    doubt = f"the dates, such as {first[:_LONGEST_QUOTE]!r}, may have the day or the month first"
-    return _column(known, read, doubt)
+    ambiguity = f"the dates, such as {first[:_LONGEST_QUOTE]!r}, may have the day or the month first"
+    return _column(known, read, ambiguity)
 
 
-def _column(seconds: Floats, read: _Read, doubt: str = "") -> Column:
+def _column(seconds: Floats, read: _Read, ambiguity: str = "") -> Column:
     dated = not bool(np.all(np.isnan(seconds)))
-    return Column("", seconds, dated=dated, strange=read.strange, doubt=doubt)
+    return Column("", seconds, dated=dated, strange=read.strange, ambiguity=ambiguity)
 
 
 def _read(cells: Sequence[str], is_marker: Callable[[str], bool], order: str) -> _Read:

@@ -91,8 +91,8 @@ def _holders(file: BinaryIO, order: str) -> Iterator[bytes]:
         following = file.tell() + size
         head = file.read(min(size, _BEGINNING))
         packed = kind == _COMPRESSED
-        begun = zlib.decompressobj().decompress(head, 3 * _TAG) if packed else tag + head
-        if (packed or kind == _MATRIX) and _class_of(memoryview(begun), order):
+        start = zlib.decompressobj().decompress(head, 3 * _TAG) if packed else tag + head
+        if (packed or kind == _MATRIX) and _class_of(memoryview(start), order):
             content = head + file.read(size - len(head))
             yield zlib.decompress(content)[_TAG:] if packed else content
         file.seek(following)

@@ -62,12 +62,12 @@ def read_file(path: Path, **options: Any) -> RawFile:
     return _read_apart(path, _READER, options, unpacked)
 
 
-def read_datasets_apart(path: Path, wanted: frozenset[int]) -> tuple[list[int], list[dict[str, Any]], bool]:
+def read_datasets_apart(path: Path, kinds: frozenset[int]) -> tuple[list[int], list[dict[str, Any]], bool]:
     """Return the content of a universal file from `uff.read_datasets`, run in another process.
 
     Errors are as in `read_file`.
     """
-    return _read_apart(path, _READER_OF_DATASETS, {"wanted": sorted(wanted)}, unpacked_datasets)
+    return _read_apart(path, _READER_OF_DATASETS, {"wanted": sorted(kinds)}, unpacked_datasets)
 
 
 def _read_apart(

@@ -51,7 +51,7 @@ class Column:
         The cells are dates or times of day, and so instants; the values are s after the first one.
     strange : sequence of (row, text)
         Cells of text that are neither a number nor a known marker; their values are NaN.
-    doubt : str
+    ambiguity : str
         Another possible reading of the instants, in words; using such a column needs a decision of the user.
     """
 
@@ -66,7 +66,7 @@ class Column:
     attrs: dict[str, Any] = field(default_factory=dict)
     dated: bool = False
     strange: Sequence[tuple[int, str]] = ()
-    doubt: str = ""
+    ambiguity: str = ""
 
 
 @dataclass(frozen=True, slots=True)

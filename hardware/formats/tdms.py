@@ -24,7 +24,7 @@ from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, Floats, Raw
 
 _MOST_HEARD = 20
 _LONGEST_HEARD = 120
-_SAYS_CUT_OFF = re.compile(
+_CUT_OFF_WARNING = re.compile(
     r"Last segment (of file has less data than expected|metadata is incomplete)"
     r"|Data size \d+ is not a multiple|Cropping data from"
 )
@@ -53,8 +53,8 @@ def read_tdms(path: os.PathLike[str] | str) -> RawFile:
         TdmsFile.open(stream) as file,
     ):
         raw = _read(file, os.stat(path).st_size)
-    damage = _CUT_OFF if any(_SAYS_CUT_OFF.match(line) for line in heard) else ""
-    others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _SAYS_CUT_OFF.match(line))
+    damage = _CUT_OFF if any(_CUT_OFF_WARNING.match(line) for line in heard) else ""
+    others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _CUT_OFF_WARNING.match(line))
     return replace(raw, remarks=[*raw.remarks, *others][:_MOST_HEARD], damage=damage)
 
 
@@ -163,9 +163,9 @@ def _column(channel: Any, values: Floats, origin: np.datetime64 | None, remarks:
     )
     increment = _number(known.get("wf_increment"))
     samples = _number(known.get("wf_samples"))
-    said = "wf_samples is the size of a block, not the length: the samples are counted"
-    if samples is not None and samples != len(values) and said not in remarks:
-        remarks.append(said)
+    remark = "wf_samples is the size of a block, not the length: the samples are counted"
+    if samples is not None and samples != len(values) and remark not in remarks:
+        remarks.append(remark)
     return column_of(
         channel.name,
         values,

@@ -160,8 +160,8 @@ def _parsed_in_pieces(content: str, delimiter: str | None, decimal: str) -> _Par
     cut: list[str] = []
 
     def last_lines(lines: list[str]) -> list[str]:
-        rows, said = without_cut_cells(lines, content, dialect.delimiter, dialect.decimal)
-        cut.extend(said)
+        rows, cut_remarks = without_cut_cells(lines, content, dialect.delimiter, dialect.decimal)
+        cut.extend(cut_remarks)
         return rows
 
     begin = sum(map(len, head[:first]))
@@ -380,13 +380,15 @@ def _all_headings(
     narrow = len(split_line(rows[0], delimiter)) if rows else width
     if any(labels) or narrow >= width:
         return labels, units, []
-    begun = next(place for place, row in enumerate(rows, 1) if len(split_line(row, delimiter)) > narrow)
+    first_row = next(place for place, row in enumerate(rows, 1) if len(split_line(row, delimiter)) > narrow)
     labels, units = headings(header, narrow, delimiter)
     several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
     verb = "have" if width > narrow + 1 else "has"
-    said = message(f"{several} in row {begun} of the table, and {verb} no heading (", Argument("name"), ")")
+    remark = message(
+        f"{several} in row {first_row} of the table, and {verb} no heading (", Argument("name"), ")"
+    )
     more = [""] * (width - narrow)
-    return labels + more, units + more, [said] if any(labels) else []
+    return labels + more, units + more, [remark] if any(labels) else []
 
 
 def _uncommented(line: str) -> str:

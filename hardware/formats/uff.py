@@ -68,7 +68,7 @@ def read_uff(path: os.PathLike[str] | str) -> RawFile:
 
 
 def read_datasets(
-    path: os.PathLike[str] | str, wanted: frozenset[int]
+    path: os.PathLike[str] | str, kinds: frozenset[int]
 ) -> tuple[list[int], list[Mapping[str, Any]], bool]:
     """Return the types of all datasets, the contents of the wanted types, and whether the file is cut off.
 
@@ -87,7 +87,7 @@ def read_datasets(
             types = [int(kind) for kind in file.get_set_types()]
             if len(types) > 2 * MOST_COLUMNS:
                 raise DatasetError(f"expected at most {2 * MOST_COLUMNS} datasets, got {len(types)}.")
-            return types, [file.read_sets(at) for at, kind in enumerate(types) if kind in wanted], cut
+            return types, [file.read_sets(at) for at, kind in enumerate(types) if kind in kinds], cut
     except DatasetError:
         raise
     # on damaged bytes the reader may raise any error
@@ -139,14 +139,14 @@ def _sorted_out(
         tables.insert(0, Table(even, vectors=True))
     if not tables:
         kinds = ", ".join(str(kind) for kind in sorted(types)) or "none"
-        lost = f" Besides, {_CUT_OFF}." if cut else ""
+        cut_remark = f" Besides, {_CUT_OFF}." if cut else ""
         what = joined("; ", (reworded(line, lambda text: text.split(";")[0]) for line in remarks))
         raise DatasetError(
             message(
                 "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type ",
                 *(kinds, *((" (", reworded(what, lambda text: text[:300]), ")") if what else ())),
                 ". In Python, hardware.formats.universal.read_universal reads frequency responses, spectra, shapes "
-                f"and geometry.{lost}",
+                f"and geometry.{cut_remark}",
             )
         )
     return RawFile("universal file (UFF 58)", tables, remarks)

@@ -31,7 +31,7 @@ def read_wav(content: bytes) -> RawFile:
     from scipy.io import wavfile
 
     data = _samples_of(content)
-    with one_refusal("a whole WAV file of plain samples"), warnings.catch_warnings(record=True) as said:
+    with one_refusal("a whole WAV file of plain samples"), warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         # an incomplete frame is dropped
         rate, samples = wavfile.read(io.BytesIO(content[: data.end] if data.is_cut else content))
@@ -45,7 +45,7 @@ def read_wav(content: bytes) -> RawFile:
             f"expected samples of 1 to {MOST_COLUMNS} channels at a rate above 0, got {len(table)} of "
             f"{table.shape[1]} at {rate} Hz."
         )
-    heard = sorted({str(one.message) for one in said if not str(one.message).startswith(_KNOWN_WORDS)})
+    heard = sorted({str(one.message) for one in warned if not str(one.message).startswith(_KNOWN_WORDS)})
     remarks = [f"scipy says: {line[:120]}" for line in heard]
     if table.dtype.kind != "f":
         remarks.append(

@@ -97,7 +97,7 @@ def keep_all(
     try:
         for block in acquired.blocks():
             keeper.take(block)
-            progress.saw(block, keeper.said)
+            progress.saw(block, keeper.status)
     except (daqmx.DaqError, daqmx.RpcError, RigError) as error:
         failure = error
     keeper.end(str(refusal_of(acquired.rig.name, failure)) if failure is not None else "")
@@ -117,7 +117,7 @@ class _Keeper:
         self._long = False
 
     @property
-    def said(self) -> str:
+    def status(self) -> str:
         """The number of pulses, in words."""
         if self._finder is None:
             return ""

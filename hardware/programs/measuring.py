@@ -32,7 +32,7 @@ UNKNOWN_DURATION = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Request:
     """The request: inputs, rate and duration."""
 
     inputs: tuple[Input, ...]
@@ -50,13 +50,13 @@ class Wanted:
         return None if self.duration is None else round(self.rate * self.duration)
 
 
-def wanted_of(
+def request_of(
     channels: Sequence[str],
     loopbacks: Sequence[str],
     calibrations: Sequence[str | os.PathLike[str]],
     rate: float,
     duration: float | None,
-) -> Wanted:
+) -> Request:
     """Return the requested measurement; UsageError, before anything is opened, if the request is invalid."""
     inputs = inputs_of([*channels, *loopbacks])
     if not inputs:
@@ -71,7 +71,7 @@ def wanted_of(
             f"--rate, --duration: expected {FEWEST_SAMPLES} samples or more, got {rate:g} Hz for {duration:g} s."
         )
     back = frozenset(each.name for each in inputs[len(channels) :])
-    return Wanted(
+    return Request(
         tuple(inputs), back, read_calibrations([Path(each) for each in calibrations], inputs), rate, duration
     )
 
@@ -81,7 +81,7 @@ Describe = Callable[[Rig, Facts], Measurement]
 
 def measured(
     rig: str | Rig | None,
-    wanted: Wanted,
+    request: Request,
     describe: Describe,
     *,
     most_pulses: int | None = None,
@@ -99,14 +99,14 @@ def measured(
         opened = rig if isinstance(rig, Rig) else stack.enter_context(opened_rig(rig))
         try:
             acquired = stack.enter_context(
-                Acquisition(opened, wanted.inputs, wanted.rate, count=wanted.count)
+                Acquisition(opened, request.inputs, request.rate, count=request.count)
             )
             measurement = describe(opened, acquired.facts)
-            _refuse_many(measurement, wanted)
+            _refuse_many(measurement, request)
             header = measurement.model_dump(mode="json")
             file = None if journal is None else stack.enter_context(Journal(Path(journal), header))
             stack.enter_context(stopped_by_signals(acquired.stop))
-            return _kept(acquired, measurement, Store(header, file), wanted, most_pulses, live)
+            return _kept(acquired, measurement, Store(header, file), request, most_pulses, live)
         except (daqmx.DaqError, daqmx.RpcError) as error:
             raise refusal_of(opened.name, error) from None
 
@@ -115,13 +115,13 @@ def _kept(
     acquired: Acquisition,
     measurement: Measurement,
     store: Store,
-    wanted: Wanted,
+    request: Request,
     most_pulses: int | None,
     live: bool,
 ) -> Recording:
     finder = None if measurement.pulses is None else PulseFinder(measurement, most_pulses)
-    most = None if finder is None and wanted.count is not None else measurement.most_samples
-    with shown_live(acquired, measurement.inputs, wanted.duration, live) as progress:
+    most = None if finder is None and request.count is not None else measurement.most_samples
+    with shown_live(acquired, measurement.inputs, request.duration, live) as progress:
         failure = keep_all(acquired, store, progress, finder, most)
     if failure is not None and not store.kept:
         raise failure
@@ -130,17 +130,17 @@ def _kept(
     return recording_in(store.content(), measurement.rig)
 
 
-def _refuse_many(measurement: Measurement, wanted: Wanted) -> None:
-    if measurement.pulses is None and (wanted.count or 0) > measurement.most_samples:
+def _refuse_many(measurement: Measurement, request: Request) -> None:
+    if measurement.pulses is None and (request.count or 0) > measurement.most_samples:
         raise UsageError(
             f"--rate, --duration: expected at most {measurement.most_samples} samples of each of "
-            f"{len(measurement.inputs)} inputs, as a recording takes, got {wanted.count}."
+            f"{len(measurement.inputs)} inputs, as a recording takes, got {request.count}."
         )
 
 
 def measure_into(
     options: Record | RecordSpikes,
-    wanted: Wanted,
+    request: Request,
     describe: Describe,
     *,
     in_pieces: bool = False,
@@ -158,11 +158,11 @@ def measure_into(
     refuse_overwriting(output, options.force, lambda there: False)
     journal = output.with_suffix(ENDING)
     refuse_journal(journal)
-    seconds = UNKNOWN_DURATION if wanted.duration is None else wanted.duration
+    seconds = UNKNOWN_DURATION if request.duration is None else request.duration
     if in_pieces:
         seconds = min(seconds, UNKNOWN_DURATION)
-    refuse_full_disk(output.parent, 8.0 * len(wanted.inputs) * wanted.rate * seconds)
-    recording = measured(options.rig, wanted, describe, most_pulses=most_pulses, journal=journal, live=True)
+    refuse_full_disk(output.parent, 8.0 * len(request.inputs) * request.rate * seconds)
+    recording = measured(options.rig, request, describe, most_pulses=most_pulses, journal=journal, live=True)
     with stopped_by_signals(lambda: None):
         try:
             write_and_show(recording, output)

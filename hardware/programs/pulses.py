@@ -73,7 +73,7 @@ class PulseFinder:
         rises = numbers[up[1:] & ~up[:-1]]
         starts = self._new_starts(rises)
         kept = self._within(numbers, up[1:], starts)
-        count = self._wanted(numbers, kept, starts)
+        count = self._needed(numbers, kept, starts)
         self._end = block.first + count
         self._is_up = bool(up[count])
         self.starts += starts[starts < self._end].tolist()
@@ -95,9 +95,9 @@ class PulseFinder:
         self._highest = max(self._highest, float(height.max()))
         is_over = height < self._rule.hysteresis * level
         # between the two levels the state does not change
-        says = np.concatenate([[was_up], np.where(height >= level, 1, np.where(is_over, 0, -1))])
-        last_said = np.maximum.accumulate(np.where(says >= 0, np.arange(len(says)), 0))
-        up: Mask = says[last_said] == 1
+        crossings = np.concatenate([[was_up], np.where(height >= level, 1, np.where(is_over, 0, -1))])
+        last_crossing = np.maximum.accumulate(np.where(crossings >= 0, np.arange(len(crossings)), 0))
+        up: Mask = crossings[last_crossing] == 1
         return up
 
     def _new_starts(self, rises: Numbers) -> Numbers:
@@ -117,7 +117,7 @@ class PulseFinder:
         kept: Mask = (numbers - last_up <= self._rule.after) | (numbers - start < self._rule.dead)
         return kept
 
-    def _wanted(self, numbers: Numbers, kept: Mask, starts: Numbers) -> int:
+    def _needed(self, numbers: Numbers, kept: Mask, starts: Numbers) -> int:
         """Return the number of samples to use: all up to the end of the last pulse in `most`."""
         missing = (self._most or len(self.starts) + len(starts) + 1) - len(self.starts)
         if missing > len(starts):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.hardware.operations.rig_record import Record
-from vibroimpact.hardware.programs.measuring import Describe, Wanted, measure_into, measured, wanted_of
+from vibroimpact.hardware.programs.measuring import Describe, Request, measure_into, measured, request_of
 from vibroimpact.hardware.rig.acquisition import Facts
 from vibroimpact.hardware.rig.measurement import Measurement, measurement_of
 from vibroimpact.hardware.rig.opening import Rig
@@ -58,22 +58,22 @@ def record(
     >>> len(tip.values), tip.unit, tip.axis.rate
     (1000, 'V', 5000.0)
     """
-    wanted = wanted_of(channels, loopback, calibration, rate, duration)
-    return measured(rig, wanted, _describer(wanted), journal=journal)
+    request = request_of(channels, loopback, calibration, rate, duration)
+    return measured(rig, request, _describer(request), journal=journal)
 
 
 def record_channels(options: Record) -> None:
     """Record inputs of a rig into a file."""
-    wanted = wanted_of(
+    request = request_of(
         options.channel, options.loopback or (), options.calibration or (), options.rate, options.duration
     )
-    measure_into(options, wanted, _describer(wanted))
+    measure_into(options, request, _describer(request))
 
 
-def _describer(wanted: Wanted) -> Describe:
+def _describer(request: Request) -> Describe:
     def describe(rig: Rig, facts: Facts) -> Measurement:
         return measurement_of(
-            "record", rig, facts, wanted.inputs, wanted.calibrations, loopbacks=wanted.loopbacks
+            "record", rig, facts, request.inputs, request.calibrations, loopbacks=request.loopbacks
         )
 
     return describe

@@ -79,12 +79,12 @@ def drive_sine(
     --------
     >>> drive_sine("Dev1/ao0", 5.3, 1.0, duration=10.0, rig="virtual:oscillator.toml")          # doctest: +SKIP
     """
-    wanted = sine_of(frequency, amplitude, ramp, duration, rate)
+    waveform = sine_of(frequency, amplitude, ramp, duration, rate)
     limits = Limits(most_amplitude, most_slew)
-    wanted.refuse_beyond(limits)
-    said = say if progress else _unsaid
+    waveform.refuse_beyond(limits)
+    report = say if progress else _unsaid
     interrupted = []
-    with opened_rig(rig) as opened, Output(opened, terminal, rate, wanted, limits) as output:
+    with opened_rig(rig) as opened, Output(opened, terminal, rate, waveform, limits) as output:
 
         def stop() -> None:
             interrupted.append(True)
@@ -93,7 +93,7 @@ def drive_sine(
         with stopped_by_signals(stop):
             output.start()
             if output.has_driven:
-                said(
+                report(
                     f"{terminal} on {opened.name}: {frequency:g} Hz, {amplitude:g} V. Ctrl-C brings it to rest."
                 )
             with _shown() if progress else nullcontext(_unsaid) as show:
@@ -102,7 +102,7 @@ def drive_sine(
                     show(f"{terminal}: {output.generated / rate:.1f} s{stage}")
             output.wait()
         if interrupted:
-            said(f"{terminal} is at 0 V." if output.has_driven else "Nothing was driven.")
+            report(f"{terminal} is at 0 V." if output.has_driven else "Nothing was driven.")
             raise KeyboardInterrupt
     return output.generated / rate
 

@@ -92,8 +92,8 @@ class Parts:
             value = float(changed.values[0])
             beyond = column.overrange is not None and bool(column.overrange[0])
             self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label, beyond)
-            said = "which the file marks as overrange" if beyond else f"{value:g}"
-            return [*remarks, f"{name}: one value only, {said}: kept beside the channels"]
+            meaning = "which the file marks as overrange" if beyond else f"{value:g}"
+            return [*remarks, f"{name}: one value only, {meaning}: kept beside the channels"]
         key = (at, len(column.values), column.interval, column.start, column.group)
         if key not in placements:
             trigger = ", ".join(part for part in (source.path.name, table.title, column.group) if part)
@@ -135,11 +135,11 @@ def _length_remarks(table: Table) -> list[str]:
 def _described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:
     """Return a column with unit, scale and offset from the settings of column `number` (from 0), and remarks."""
     remarks: list[str] = []
-    unit, said = _picked(settings.unit, number), ""
+    unit, remark = _picked(settings.unit, number), ""
     if unit is None:
-        unit, said = meant_unit(column.label, column.unit)
-    if said:
-        remarks.append(message(f"{name}: {said} (", Argument("unit"), " if not)"))
+        unit, remark = meant_unit(column.label, column.unit)
+    if remark:
+        remarks.append(message(f"{name}: {remark} (", Argument("unit"), " if not)"))
     if not is_known_unit(unit):
         remarks.append(
             message(

@@ -55,8 +55,10 @@ def _remarks(
     remarks = []
     if np.any(clipped):
         levels = sorted({float(level) for level in values[clipped]})
-        said = " and ".join(f"{level:.6g}" for level in dict.fromkeys((levels[0], levels[-1])))
-        remarks.append(f"{name}: {int(clipped.sum())} samples are clipped, at {said} {column.unit}".rstrip())
+        clipped_at = " and ".join(f"{level:.6g}" for level in dict.fromkeys((levels[0], levels[-1])))
+        remarks.append(
+            f"{name}: {int(clipped.sum())} samples are clipped, at {clipped_at} {column.unit}".rstrip()
+        )
     if np.any(overrange):
         remarks.append(f"{name}: {int(overrange.sum())} samples are marked as overrange: NaN")
     if np.any(hidden):

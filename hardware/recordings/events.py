@@ -37,13 +37,13 @@ def looks_like_events(column: Column) -> bool:
     return float(steps.std()) > max(_UNEVEN * float(steps.mean()), decimal_step(values))
 
 
-def is_raster(table: Table, wanted: bool | None = None) -> bool:
+def is_raster(table: Table, choice: bool | None = None) -> bool:
     """Whether the columns of a table hold only 0 and 1, as trials of a raster do, so that each 1 is an event.
 
-    `wanted` is the user's choice: all columns are events, or none is. Without a choice the ones must be few and
+    `choice` is the user's choice: all columns are events, or none is. Without a choice the ones must be few and
     isolated: a column that stays at 1 is the level of a switch.
     """
-    if wanted is False or not table.columns:
+    if choice is False or not table.columns:
         return False
     ones = [column.values == 1.0 for column in table.columns]
     known = all(
@@ -51,7 +51,7 @@ def is_raster(table: Table, wanted: bool | None = None) -> bool:
     )
     if not known or not any(one.any() for one in ones):
         return False
-    return bool(wanted) or all(
+    return bool(choice) or all(
         float(np.mean(one)) <= _FEW_ONES and not np.any(one[1:] & one[:-1]) for one in ones if len(one)
     )
 

@@ -9,7 +9,7 @@ from vibroimpact.hardware.formats.table import Floats
 _MOST_DIGITS = 12
 _MOST_READ = 20_000
 _NEARLY_ALL = 0.9
-_DIGIT_LOST = 0.2
+_LARGEST_ROUNDING = 0.2
 """Largest error of binary, in units of the last digit; 40 % of arbitrary numbers are as close to their digits."""
 
 
@@ -26,16 +26,16 @@ def decimal_step(values: Floats) -> float:
     if not len(read):
         return 0.0
     # seconds since 1970 have lost some of their last digit in binary; whole numbers are on every grid
-    lost = float(np.spacing(np.abs(read).max())) / 2.0
-    if lost > _DIGIT_LOST:
+    rounding = float(np.spacing(np.abs(read).max())) / 2.0
+    if rounding > _LARGEST_ROUNDING:
         return 0.0
     beyond = read - np.rint(read[0])
     for digits in range(_MOST_DIGITS + 1):
         scaled = beyond * 10.0**digits
         allowed = max(
-            1e-6, 1.01 * (lost + float(np.spacing(np.abs(scaled).max())) * 10.0**-digits) * 10.0**digits
+            1e-6, 1.01 * (rounding + float(np.spacing(np.abs(scaled).max())) * 10.0**-digits) * 10.0**digits
         )
-        if allowed > _DIGIT_LOST:
+        if allowed > _LARGEST_ROUNDING:
             return 0.0
         if float(np.mean(np.abs(scaled - np.rint(scaled)) <= allowed)) >= _NEARLY_ALL:
             return 10.0**-digits

@@ -247,13 +247,13 @@ def _by_line(
     if len(agreeing) < len(declared):
         spread = [line.interval, *declared]
         uncertainty = (max(spread) - min(spread)) / line.interval
-        said = ", ".join(f"{interval:.6g}" for interval in sorted(set(declared)))
+        intervals = ", ".join(f"{interval:.6g}" for interval in sorted(set(declared)))
         remarks.append(
-            f"the time axes conflict: {said} s an interval in the header, {line.interval:.6g} s in the column of "
+            f"the time axes conflict: {intervals} s an interval in the header, {line.interval:.6g} s in the column of "
             f"instants, which is used since it was written with the rows; all frequencies are uncertain by "
             f"{uncertainty:.1%}"
         )
-        source = f"the column of instants ({line.interval:.6g} s); the header says {said} s"
+        source = f"the column of instants ({line.interval:.6g} s); the header says {intervals} s"
         return _even(line.start, line.interval, length, source, remarks, uncertainty)
     if declared and line.is_rounded:
         own = column.interval if column.interval is not None else agreeing[0]
@@ -271,9 +271,9 @@ def _line_remarks(line: _Line, instants: Floats, length: int) -> list[str]:
         remarks.append(
             f"the instants are rounded to {line.digits:.0e} s and {line.interval:.6g} s apart: they are taken as even"
         )
-    gone = int(np.sum(~np.isfinite(instants)))
-    if gone:
-        remarks.append(f"{gone} rows have no instant; they are counted on")
+    missing = int(np.sum(~np.isfinite(instants)))
+    if missing:
+        remarks.append(f"{missing} rows have no instant; they are counted on")
     if length > len(instants):
         remarks.append(f"{length - len(instants)} rows after the last instant are counted on from it")
     return remarks

@@ -95,10 +95,10 @@ def _are_days(time: Column) -> bool:
     # seconds are printed with few digits, days with all digits
     if not 0.0 < step < _SLOWEST or decimal_step(known) >= _PRINTED * step:
         return False
-    lost = 2.0 * float(np.spacing(known[-1])) / step
-    if not _is_round(step * _DAY, lost):
+    rounding = 2.0 * float(np.spacing(known[-1])) / step
+    if not _is_round(step * _DAY, rounding):
         return False
-    if step > _FASTEST and _is_round(step, lost):
+    if step > _FASTEST and _is_round(step, rounding):
         raise DatasetError(
             message(
                 f"column of instants: expected seconds, got {known[0]:.6g} and on in steps of {step:.3g}: seconds, "
@@ -109,10 +109,10 @@ def _are_days(time: Column) -> bool:
     return True
 
 
-def _is_round(interval: float, lost: float) -> bool:
-    """Whether an interval, or its rate, is a whole number, within the rounding `lost` of binary."""
+def _is_round(interval: float, rounding: float) -> bool:
+    """Whether an interval, or its rate, is a whole number, within the relative error `rounding` of binary."""
     larger = max(interval, 1.0 / interval)
-    return abs(larger - round(larger)) < (_ROUND + lost) * larger
+    return abs(larger - round(larger)) < (_ROUND + rounding) * larger
 
 
 def _parts_of(time: Column) -> float | None:

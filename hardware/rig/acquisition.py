@@ -161,7 +161,7 @@ class Acquisition:
             raise UsageError(f"--rate: expected a number > 0, got {rate:g}.")
         if count is not None and count < 1:
             raise UsageError(f"samples: expected 1 or more, got {count}.")
-        self.rig, self._inputs, self._asked = rig, tuple(inputs), rate
+        self.rig, self._inputs, self._requested_rate = rig, tuple(inputs), rate
         self._count, self._trigger = count, trigger
         self.gaps: list[Gap] = []
         self._waiting: deque[Block] = deque()
@@ -190,9 +190,9 @@ class Acquisition:
             task.ai_channels.add_ai_voltage_chan(
                 each.terminal, each.name, min_val=-each.highest, max_val=each.highest
             )
-        most = min(BUFFER_SECONDS * self._asked, BUFFER_VALUES / len(self._inputs))
+        most = min(BUFFER_SECONDS * self._requested_rate, BUFFER_VALUES / len(self._inputs))
         task.timing.cfg_samp_clk_timing(
-            self._asked,
+            self._requested_rate,
             sample_mode=constants.AcquisitionType.CONTINUOUS,
             samps_per_chan=max(2, round(most)),
         )
@@ -309,14 +309,14 @@ class Acquisition:
             self._reader.read_many_sample(volts, count, timeout)
         except daqmx.DaqError as error:
             if error.error_code == daqmx.DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE and not self._trigger:
-                self._start_anew()
+                self._restart()
                 return volts[:, :0]
             if error.error_code != daqmx.DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE:
                 raise
             return volts[:, : int(getattr(error, "samps_per_chan_read", 0) or 0)]
         return volts
 
-    def _start_anew(self) -> None:
+    def _restart(self) -> None:
         """Start the task again after samples were overwritten, and find its position by the clock of the computer."""
         with suppress(daqmx.DaqError):  # the task repeats its failure
             self._task.stop()

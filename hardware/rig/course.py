@@ -75,8 +75,8 @@ class Course:
         if volts.shape != (count,):
             raise UsageError(f"output: expected a waveform of {count} samples, got shape {volts.shape}.")
         if self._fade_from is not None:
-            gone = np.arange(self.next + 1, self.next + count + 1, dtype=np.float64) - self._fade_from
-            volts = volts * (1.0 - envelope(gone, self._fade_samples))
+            elapsed = np.arange(self.next + 1, self.next + count + 1, dtype=np.float64) - self._fade_from
+            volts = volts * (1.0 - envelope(elapsed, self._fade_samples))
             volts = _followed(volts, self.last, self._limits.slew / self._rate)
         self._limits.check(volts, self.last, self._rate, self.next)
         return volts

@@ -48,9 +48,9 @@ class Watch:
         """Return the reason for which the guardian is needed; empty if the output is at rest."""
         beat, since, looked = -1, 0.0, time.monotonic()
         while True:
-            said = self._said(LOOK)
-            if said is not None:
-                return said
+            reason = self._program_end(LOOK)
+            if reason is not None:
+                return reason
             now = time.monotonic()
             late, looked = now - looked > 0.5 * HANG_SECONDS, now
             if (
@@ -63,7 +63,7 @@ class Watch:
                     return f"showed no life for {HANG_SECONDS:g} s and was ended"
                 since = now
 
-    def _said(self, seconds: float) -> str | None:
+    def _program_end(self, seconds: float) -> str | None:
         """Return the meaning of the program's end or message; None if it continues."""
         if os.getppid() != self._order.program:
             return "has ended"

@@ -48,30 +48,30 @@ class Guardian:
             self._process = Process("-m", MODULE, errors="shared", passed=[order.descriptor])
         except OSError as error:
             raise RigError(f"guardian: cannot be started ({error.strerror}). Nothing was driven.") from None
-        self._tell(json.dumps(asdict(order)))
+        self._send(json.dumps(asdict(order)))
 
     def await_ready(self) -> None:
         """Wait until it guards; RigError if it does not."""
-        said = self._process.line(READY_SECONDS)
-        if said != READY:
+        answer = self._process.line(READY_SECONDS)
+        if answer != READY:
             raise RigError(
-                f"guardian: expected one that is ready, got {said or self._end()}. Nothing was driven."
+                f"guardian: expected one that is ready, got {answer or self._end()}. Nothing was driven."
             )
 
     @property
-    def is_gone(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether its process has ended."""
         return self._process.poll() is not None
 
     def take_over(self, seconds: float) -> str:
         """Let it bring the output to rest; return an empty text, or the reason of its failure."""
-        self._tell(TAKE_OVER)
-        said = self._process.line(seconds)
-        return "" if said == REST else said or f"the guardian did not answer ({self._end()})"
+        self._send(TAKE_OVER)
+        answer = self._process.line(seconds)
+        return "" if answer == REST else answer or f"the guardian did not answer ({self._end()})"
 
     def leave(self) -> None:
         """Let it end, since the output is at rest; no process remains."""
-        self._tell(REST)
+        self._send(REST)
         self._process.end(LEAVE_SECONDS)
         self._process.stdout.close()
 
@@ -79,5 +79,5 @@ class Guardian:
         code = self._process.poll()
         return "no answer" if code is None else f"a process that {ending(code)}"
 
-    def _tell(self, text: str) -> None:
+    def _send(self, text: str) -> None:
         self._process.say([f"{text}\n".encode()])

@@ -180,10 +180,10 @@ def refuse_full_disk(folder: Path, bytes_needed: float) -> None:
     UsageError
     """
     free = shutil.disk_usage(folder).free
-    wanted = (1.0 + AS_RECORDING) * bytes_needed + MARGIN
-    if free < wanted:
+    required = (1.0 + AS_RECORDING) * bytes_needed + MARGIN
+    if free < required:
         raise UsageError(
-            f"{folder}: expected {wanted / 2**20:.0f} MiB of free space for the journal and the recording, "
+            f"{folder}: expected {required / 2**20:.0f} MiB of free space for the journal and the recording, "
             f"got {free / 2**20:.0f}. Choose another disk, a lower rate or a shorter duration."
         )
 

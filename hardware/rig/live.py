@@ -49,8 +49,8 @@ class Levels:
         parts = []
         for place, each in enumerate(self._inputs):
             if self._low[place] <= self._high[place]:
-                said = f"{each.name} {self._low[place]:.3g} to {self._high[place]:.3g} V"
-                parts.append(said + (f" ({self.clipped[place]} CLIPPED)" if self.clipped[place] else ""))
+                text = f"{each.name} {self._low[place]:.3g} to {self._high[place]:.3g} V"
+                parts.append(text + (f" ({self.clipped[place]} CLIPPED)" if self.clipped[place] else ""))
         self._forget()
         return ", ".join(parts)
 
@@ -109,10 +109,10 @@ class Progress:
 
 @contextmanager
 def shown_live(
-    acquired: Acquisition, inputs: Sequence[MeasuredInput], duration: float | None, wanted: bool = True
+    acquired: Acquisition, inputs: Sequence[MeasuredInput], duration: float | None, shown: bool = True
 ) -> Iterator[Progress]:
     """Show a measurement on standard error: a changing line in a terminal, else one line from time to time."""
-    if not wanted:
+    if not shown:
         yield Progress(acquired, inputs, duration, lambda line: None, np.inf)
     elif not sys.stderr.isatty():
         yield Progress(acquired, inputs, duration, note, LINE_SECONDS)

@@ -207,8 +207,8 @@ def recording_of(
         volts[:, place : place + block.volts.shape[1]] = block.volts
     channels = _channels(measurement, numbers, volts, started_at)
     quiet = [] if measurement.pulses is not None else _quiet(measurement, volts)
-    said = [*_clipped(channels), *quiet, *_lost(measurement, gaps, filled), *remarks]
-    return Recording(channels, attrs=_attributes(measurement, gaps, started_at, said))
+    all_remarks = [*_clipped(channels), *quiet, *_lost(measurement, gaps, filled), *remarks]
+    return Recording(channels, attrs=_attributes(measurement, gaps, started_at, all_remarks))
 
 
 def rows_of(blocks: Sequence[Block], gaps: Sequence[Gap]) -> NDArray[np.int64]:

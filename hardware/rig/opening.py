@@ -17,7 +17,7 @@ THREE_WAYS = (
     "--rig virtual:RIG.toml starts a virtual rig, --rig grpc://host:port uses one that is served or NI's gRPC device "
     "server, --rig local uses the board of this machine, whose driver is NI-DAQmx"
 )
-ASKED_WRONGLY = (
+USAGE_ERRORS = (
     daqmx.DAQmxErrors.INVALID_DEVICE_ID,
     daqmx.DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
     daqmx.DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
@@ -88,7 +88,7 @@ def refusal_of(choice: str | None, error: Exception) -> VibroimpactError:
     if isinstance(error, daqmx.DaqNotFoundError):
         return UsageError(f"rig: expected the driver NI-DAQmx on this machine, got none. {THREE_WAYS}.")
     if isinstance(error, daqmx.DaqError):
-        kind = UsageError if error.error_code in ASKED_WRONGLY else RigError
+        kind = UsageError if error.error_code in USAGE_ERRORS else RigError
         held = error.error_code == daqmx.DAQmxErrors.PAL_RESOURCE_RESERVED
         return kind(f"{choice or 'local'}: {_one_line(error)}{HELD if held else ''}")
     return RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.")

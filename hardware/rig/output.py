@@ -323,7 +323,7 @@ class Output:
 
     @property
     def _is_unguarded(self) -> bool:
-        return self._guardian is not None and self._guardian.is_gone
+        return self._guardian is not None and self._guardian.has_ended
 
     def _follow(self, course: Course, stream: OutputStream) -> None:
         """Send the samples of the course until it is at rest."""

@@ -31,10 +31,10 @@ class Answers:
             raise Refusal(DAQmxErrors.INVALID_TASK, repr(name[:60]))
         return self._board.tasks[name]
 
-    def _wait_for(self, holds: Callable[[], bool], wanted: Callable[[], int], timeout: float) -> bool:
+    def _wait_for(self, holds: Callable[[], bool], requested: Callable[[], int], timeout: float) -> bool:
         """Wait until a condition holds, as `Board.wait_for`, or until the client has given up."""
         active: Callable[[], bool] = getattr(self.caller, "active", lambda: True)
-        found = self._board.wait_for(lambda: holds() or not active(), wanted, timeout)
+        found = self._board.wait_for(lambda: holds() or not active(), requested, timeout)
         if not active():
             raise Refusal(DAQmxErrors.TIMEOUT_EXCEEDED, "the program does not wait any more")
         return found

@@ -116,7 +116,7 @@ WRITE: dict[int, Callable[[Task], Any]] = {
 }
 BUFFER: dict[int, Callable[[Task], Any]] = {
     0x186C: lambda task: task.default_buffer() if task.kind == INPUT and task.clock else 0,
-    0x186D: lambda task: task.asked_buffer or task.length,
+    0x186D: lambda task: task.requested_buffer or task.length,
     0x230A: lambda task: 0,  # onboard samples: none, all are in the buffer
     0x230B: lambda task: 0,
 }
@@ -227,12 +227,12 @@ def of_task(group: str, task: Task, number: int) -> Any:
 
 def channels_of(task: Task, names: str) -> list[Channel]:
     """Return the channels named in a list; all channels for an empty list."""
-    asked = expanded(names)
+    requested = expanded(names)
     known = {channel.name.lower(): channel for channel in task.channels}
-    lost = [name for name in asked if name.lower() not in known]
-    if lost or not task.channels:
-        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, ", ".join(lost)[:60])
-    return [known[name.lower()] for name in asked] or task.channels
+    unknown_names = [name for name in requested if name.lower() not in known]
+    if unknown_names or not task.channels:
+        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, ", ".join(unknown_names)[:60])
+    return [known[name.lower()] for name in requested] or task.channels
 
 
 def of_channel(task: Task, names: str, number: int) -> Any:

@@ -87,9 +87,9 @@ class Board:
     def let_go(self, seconds: float) -> None:
         """Let time advance in lockstep, as if a call waited for it."""
         with self.changed:
-            self.pace.wanted = max(self.pace.wanted, self.plant.now + round(seconds / TICK))
+            self.pace.requested = max(self.pace.requested, self.plant.now + round(seconds / TICK))
             self.catch_up()
-            self.pace.wanted = self.plant.now
+            self.pace.requested = self.plant.now
 
     def _chunk(self) -> int:
         """Return the ticks of one advance."""
@@ -116,11 +116,11 @@ class Board:
             self.changed.notify_all()
         self.pace.give_up(self.plant.now, due)
 
-    def wait_for(self, holds: Callable[[], bool], wanted: Callable[[], int], timeout: float) -> bool:
+    def wait_for(self, holds: Callable[[], bool], requested: Callable[[], int], timeout: float) -> bool:
         """Wait until a condition holds, for at most `timeout` (s; < 0: no limit); return whether it holds.
 
-        In lockstep, time advances to the `wanted` tick, at which the condition is expected to hold. A rig slower than
-        real time extends the program's timeout accordingly.
+        In lockstep, time advances to the `requested` tick, at which the condition is expected to hold. A rig slower
+        than real time extends the program's timeout accordingly.
         """
         wall = timeout / min(self.pace.speed, 1.0) if not self.pace.lockstep else timeout
         end = np.inf if timeout < 0 else time.monotonic() + wall
@@ -131,7 +131,7 @@ class Board:
                     raise Refusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, self.name)
                 if self.pace.lockstep:
                     before = self.plant.now
-                    self.pace.wanted = max(self.pace.wanted, wanted())
+                    self.pace.requested = max(self.pace.requested, requested())
                     self.catch_up()
                     if self.plant.now > before:
                         continue
@@ -183,7 +183,7 @@ class Board:
         for number in range(count):
             if number:
                 self.advance(self.plant.now + step)
-                self.pace.wanted = max(self.pace.wanted, self.plant.now)
+                self.pace.requested = max(self.pace.requested, self.plant.now)
             codes[:, number] = self.analog.now(task.channels)
         return codes
 
@@ -195,7 +195,7 @@ class Board:
         for number in range(samples.shape[1]):
             if number:
                 self.advance(self.plant.now + step)
-                self.pace.wanted = max(self.pace.wanted, self.plant.now)
+                self.pace.requested = max(self.pace.requested, self.plant.now)
             self.analog.held[[channel.number for channel in task.channels]] = samples[:, number]
 
     @staticmethod

@@ -125,10 +125,10 @@ class Calls(Reads, Writes, Listening):
         """Wait until a task is done."""
         task = self._task(request)
 
-        def wanted() -> int:
+        def last_edge() -> int:
             return self._board.plant.now if task.needed is None else self._tick_of(task, task.needed - 1)
 
-        if not self._wait_for(lambda: task.is_over, wanted, self._timeout(request.time_to_wait)):
+        if not self._wait_for(lambda: task.is_over, last_edge, self._timeout(request.time_to_wait)):
             raise Refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE, task.name)
         if task.failure is not None:
             raise task.failure

@@ -48,8 +48,8 @@ def change(group: str, task: Task, number: int, value: Any) -> None:
         raise Refusal(DAQmxErrors.SPECIFIED_ATTR_NOT_VALID, f"0x{number:04X} as {type(value).__name__}")
     if group == "Timing" and number in _CLOCK_FIELDS:
         task.refuse_empty()
-        asked: Any = terminal(task.device, value) if number == 0x1852 else value
-        fields: dict[str, Any] = {_CLOCK_FIELDS[number]: asked}
+        requested: Any = terminal(task.device, value) if number == 0x1852 else value
+        fields: dict[str, Any] = {_CLOCK_FIELDS[number]: requested}
         task.timing = replace(task.timing, **fields)
     elif group == "Timing" and number == 0x1347 and value in (ON_DEMAND, SAMPLE_CLOCK):
         task.refuse_empty()
@@ -144,8 +144,8 @@ def _output_ends_at(board: Board, channel: Channel, edge: float) -> None:
     _one_of((board.profile.output_range,), edge)
 
 
-def _wire(board: Board, channel: Channel, asked: int) -> None:
-    channel.wiring = wiring(asked)
+def _wire(board: Board, channel: Channel, requested: int) -> None:
+    channel.wiring = wiring(requested)
 
 
 def _count_in_bits(board: Board, channel: Channel, unit: int) -> None:
@@ -192,11 +192,11 @@ def refuse_output_range(board: Board, low: float, high: float) -> None:
         raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a range of {low:g} to {high:g} V")
 
 
-def wiring(asked: int) -> int:
+def wiring(requested: int) -> int:
     """Return a terminal configuration; the plant is the same for all of them."""
     modes = constants.TerminalConfiguration
-    if asked == modes.DEFAULT.value:
-        asked = modes.DIFF.value
-    if asked in (modes.DIFF.value, modes.RSE.value, modes.NRSE.value):
-        return asked
-    raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"terminal configuration {asked}")
+    if requested == modes.DEFAULT.value:
+        requested = modes.DIFF.value
+    if requested in (modes.DIFF.value, modes.RSE.value, modes.NRSE.value):
+        return requested
+    raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"terminal configuration {requested}")

@@ -34,9 +34,9 @@ def decoded(message: bytes) -> dict[str, Any]:
     return values
 
 
-def _number(asked: dict[str, Any], name: str, low: float, high: float) -> float:
+def _number(request: dict[str, Any], name: str, low: float, high: float) -> float:
     """Return a number of a message that is > `low` and <= `high`."""
-    value = asked.get(name)
+    value = request.get(name)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low < value <= high:
         raise ValueError(f"{name}: expected a number > {low:g} and <= {high:g}, got {repr(value)[:60]}")
     return float(value)
@@ -70,7 +70,7 @@ class Controls:
             "Vanish": self.vanish,
         }
 
-    def state(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def state(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the time of the rig, its pace and its tasks."""
         board = self._board
         with board.changed:
@@ -86,79 +86,79 @@ class Controls:
                 "faults": board.analog.inputs.faults(board.name),
             }
 
-    def pace(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def pace(self, request: dict[str, Any]) -> dict[str, Any]:
         """Change lockstep or speed."""
-        lockstep = asked.get("lockstep")
+        lockstep = request.get("lockstep")
         if lockstep not in (None, True, False):
             raise ValueError(f"lockstep: expected true or false, got {lockstep!r}")
-        speed = None if asked.get("speed") is None else _number(asked, "speed", 0.0, FASTEST)
+        speed = None if request.get("speed") is None else _number(request, "speed", 0.0, FASTEST)
         self._board.set_pace(lockstep=lockstep, speed=speed)
         return self.state({})
 
-    def advance(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def advance(self, request: dict[str, Any]) -> dict[str, Any]:
         """Let the time of the rig advance in lockstep; it stops before a buffer runs empty or overflows."""
-        self._board.let_go(_number(asked, "seconds", 0.0, 1e6))
+        self._board.let_go(_number(request, "seconds", 0.0, 1e6))
         return self.state({})
 
-    def pulse(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def pulse(self, request: dict[str, Any]) -> dict[str, Any]:
         """Put an edge on a terminal."""
-        return {"started": self._board.pulse(str(asked.get("terminal", "")))}
+        return {"started": self._board.pulse(str(request.get("terminal", "")))}
 
-    def lose(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def lose(self, request: dict[str, Any]) -> dict[str, Any]:
         """Make the device inaccessible, as if its cable were pulled out."""
         self._board.lose(self._board.name)
         return {}
 
     # ---- faults ----
 
-    def overrun(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def overrun(self, request: dict[str, Any]) -> dict[str, Any]:
         """Make the running inputs lose samples: the next read raises the error."""
         return {"failed": self._board.overrun()}
 
-    def starve(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def starve(self, request: dict[str, Any]) -> dict[str, Any]:
         """Make the running outputs without regeneration run empty."""
         return {"failed": self._board.starve()}
 
-    def stick(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def stick(self, request: dict[str, Any]) -> dict[str, Any]:
         """Make an input keep a voltage: the next sampled value, or a given one."""
-        number = self._input(asked)
-        volts = None if asked.get("volts") is None else _number(asked, "volts", -1e3, 1e3)
+        number = self._input(request)
+        volts = None if request.get("volts") is None else _number(request, "volts", -1e3, 1e3)
         with self._board.changed:
             self._board.catch_up()
             self._board.analog.inputs.stuck[number] = volts
         return self.state({})
 
-    def clip(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def clip(self, request: dict[str, Any]) -> dict[str, Any]:
         """Make an input saturate at a voltage of either sign."""
-        number, volts = self._input(asked), _number(asked, "volts", 0.0, 1e3)
+        number, volts = self._input(request), _number(request, "volts", 0.0, 1e3)
         with self._board.changed:
             self._board.catch_up()
             self._board.analog.inputs.clipped[number] = volts
         return self.state({})
 
-    def clock_error(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def clock_error(self, request: dict[str, Any]) -> dict[str, Any]:
         """Set the error of the input clock."""
-        self._board.set_clock_error(_number(asked, "ppm", -WORST_CLOCK, WORST_CLOCK))
+        self._board.set_clock_error(_number(request, "ppm", -WORST_CLOCK, WORST_CLOCK))
         return self.state({})
 
-    def mend(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def mend(self, request: dict[str, Any]) -> dict[str, Any]:
         """Clear stuck inputs, clipping and the error of the clock."""
         self._board.mend()
         return self.state({})
 
-    def vanish(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def vanish(self, request: dict[str, Any]) -> dict[str, Any]:
         """End the server in the middle of all calls."""
         self._vanish()
         return {}
 
-    def _input(self, asked: dict[str, Any]) -> int:
-        terminal, device = str(asked.get("terminal", "")), self._board.name
+    def _input(self, request: dict[str, Any]) -> int:
+        terminal, device = str(request.get("terminal", "")), self._board.name
         names = [f"{device}/ai{number}" for number in range(self._board.profile.inputs)]
         if terminal not in names:
             raise ValueError(f"terminal: expected {names[0]} to {names[-1]}, got {terminal[:60]!r}")
         return names.index(terminal)
 
-    def truth(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def truth(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the present state of the plant, SI units, and the voltages of the outputs."""
         board = self._board
         with board.changed:

@@ -33,7 +33,7 @@ class Pace:
         Maximum wait for an idle program, s of the wall.
     slipped : float
         Total time by which the rig was late and that is not made up, s.
-    wanted : int
+    requested : int
         Tick up to which waiting calls request time, in lockstep.
     waits_for : str
         The task for which time waits; empty: time does not wait.
@@ -48,12 +48,12 @@ class Pace:
     def go_on_from(self, now: int) -> None:
         """Let time continue from a tick, now."""
         self._begin, self._origin = time.monotonic(), now
-        self.wanted, self.waits_for = now, ""
+        self.requested, self.waits_for = now, ""
 
     def due(self, now: int, tasks: Collection[Task]) -> int:
         """Return the tick that time should have reached; `now` or less where time should not advance."""
         if self.lockstep:
-            return min([self.wanted, *(task.limit for task in tasks if task.ticking)])
+            return min([self.requested, *(task.limit for task in tasks if task.ticking)])
         due = self._origin + int((time.monotonic() - self._begin) * self.speed / TICK)
         if self.speed <= 1.0:
             return due

@@ -40,7 +40,7 @@ class Plant(Protocol):
         shape (sample,).
         """
 
-    def begin_anew(self, tick: int) -> None:
+    def restart(self, tick: int) -> None:
         """Note that an input task has its first edge at a tick."""
 
     def close(self) -> None:

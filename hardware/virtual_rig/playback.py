@@ -75,7 +75,7 @@ class Playback:
         self.now, self._origin = 0, 0
         self.seed, self.fineness = 0, 0.0
 
-    def begin_anew(self, tick: int) -> None:
+    def restart(self, tick: int) -> None:
         """Begin the recording at a tick."""
         self._origin = tick
 

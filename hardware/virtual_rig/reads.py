@@ -104,8 +104,8 @@ class Reads(Answers):
         """Return samples in the requested order; by channel, each is padded to the requested length."""
         if (request.fill_mode_raw or request.fill_mode) == BY_SCAN:
             return np.ascontiguousarray(values.T).ravel()
-        asked = max(request.num_samps_per_chan, values.shape[1])
-        padded = np.zeros((len(values), asked), dtype=values.dtype)
+        requested = max(request.num_samps_per_chan, values.shape[1])
+        padded = np.zeros((len(values), requested), dtype=values.dtype)
         padded[:, : values.shape[1]] = values
         return padded.ravel()
 

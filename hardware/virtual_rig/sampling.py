@@ -47,7 +47,7 @@ class Sampling:
         volts = np.zeros(len(befores)) if driver is None else levels(driver, befores)
         for task in running:
             if task.kind == INPUT and task.count == 0 and edges[task.name][0].size:
-                self._plant.begin_anew(int(task.edge(0)))
+                self._plant.restart(int(task.edge(0)))
         found = self._plant.advance(instants, volts)
         for task in running:
             if task.kind == INPUT:
@@ -82,7 +82,7 @@ class Sampling:
         for place, (channel, ticks) in enumerate(zip(task.channels, edges, strict=True)):
             if ticks.size:
                 task.keep(place, self._codes(channel, ticks, levels, seen))
-        task.tell(task.sampled[-1])
+        task.report(task.sampled[-1])
 
     def _codes(self, channel: Channel, ticks: Ticks, levels: Levels, seen: Seen) -> NDArray[np.int16]:
         wire = self._wiring.inputs.get(channel.number)
@@ -100,7 +100,7 @@ class Sampling:
         if ticks.size:
             for place, channel in enumerate(task.channels):
                 self.held[channel.number] = samples[place, -1]
-        task.tell(task.count + ticks.size)
+        task.report(task.count + ticks.size)
 
     def now(self, channels: Sequence[Channel]) -> NDArray[np.int16]:
         """Return the present codes of inputs, without a clock; shape (channel,)."""

@@ -74,7 +74,7 @@ class ScenePlant:
             yield self._session.advance(times[begin : end + 1], volts[begin:end])
             begin = end
 
-    def begin_anew(self, tick: int) -> None:
+    def restart(self, tick: int) -> None:
         """Do nothing: the plant runs on when a measurement begins."""
 
     def close(self) -> None:

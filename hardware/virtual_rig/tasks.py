@@ -132,7 +132,7 @@ class Task:
         self.count = 0
         self.done = self.implicit = self.triggered = False
         self.failure: Refusal | None = None
-        self.asked_buffer: int | None = None
+        self.requested_buffer: int | None = None
         self.regeneration = ALLOW_REGENERATION
         self.buffer: NDArray[Any] = np.empty((0, 0))
         self.sampled: list[int] = []
@@ -193,7 +193,7 @@ class Task:
         self.refuse_empty()
         if samples is not None and samples < 1:
             raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a buffer of {samples} samples per channel")
-        self.asked_buffer = samples
+        self.requested_buffer = samples
 
     def refuse_large_buffer(self, samples: int) -> None:
         """Raise Refusal for a buffer above `MOST_SAMPLES`."""
@@ -225,8 +225,8 @@ class Task:
     def default_buffer(self) -> int:
         """Return the length of an input buffer, samples per channel."""
         assert self.clock is not None
-        if self.asked_buffer:
-            return self.asked_buffer
+        if self.requested_buffer:
+            return self.requested_buffer
         if self.clock.mode == FINITE:
             return self.clock.samples
         usual = next(size for rate, size in _DEFAULT_BUFFERS if self.clock.rate <= rate)
@@ -319,7 +319,7 @@ class Task:
         edges = self.edges_until(tick)
         return min(edges, self.position) if self.kind == OUTPUT and not self.regenerates else edges
 
-    def tell(self, count: int) -> None:
+    def report(self, count: int) -> None:
         """Report the number of elapsed clock edges to the listener."""
         self.count = count
         stream = self.every

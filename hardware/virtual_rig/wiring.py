@@ -86,13 +86,13 @@ def wiring_of(raw: object, device: str, played: bool, problems: list[Problem]) -
         problems.append(Problem("wiring", "at least one terminal", "none", _HINT))
         return None
     driver = drivers[0] if drivers else None
-    lost = [
+    undriven = [
         number for number, wire in inputs.items() if wire.signal == DRIVE and driver is None and not played
     ]
-    if lost:
+    if undriven:
         hint = 'Write ao0 = "exciter".'
         problems.append(
-            Problem(f"wiring.ai{lost[0]}", "an output at the exciter for the drive", "none", hint)
+            Problem(f"wiring.ai{undriven[0]}", "an output at the exciter for the drive", "none", hint)
         )
         return None
     # the driving voltage is an output like others

@@ -104,8 +104,8 @@ class Writes(Answers):
     def _write_buffer(self, task: Task, samples: Floats, auto_start: bool, timeout: float) -> int:
         """Write in pieces, as space becomes free."""
         if task.length == 0:
-            task.refuse_large_buffer(task.asked_buffer or samples.shape[1])
-            task.buffer = np.zeros((len(task.channels), task.asked_buffer or samples.shape[1]))
+            task.refuse_large_buffer(task.requested_buffer or samples.shape[1])
+            task.buffer = np.zeros((len(task.channels), task.requested_buffer or samples.shape[1]))
         written, whole = 0, samples.shape[1]
         end = np.inf if timeout < 0 else time.monotonic() + timeout
         while written < whole:

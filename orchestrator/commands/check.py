@@ -56,8 +56,11 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
     if meeting := contacts(scene):
         yield "contacts", "; ".join(f"{contact} {what}" for contact, what in meeting.items())
     known = effects(scene)
-    told = ("stops" if scene.stops else "", "contacts")
-    yield "effects", ", ".join(name for name, there in known.items() if there and name not in told) or "none"
+    listed = ("stops" if scene.stops else "", "contacts")
+    yield (
+        "effects",
+        ", ".join(name for name, there in known.items() if there and name not in listed) or "none",
+    )
     yield "without", ", ".join(name for name, there in known.items() if not there)
 
 
@@ -102,8 +105,8 @@ def _trial(trial: Trial) -> str:
     if trial.given_up:
         return f"{where}given up after {duration(MOST_TRIAL_SECONDS)}"
     if trial.message:
-        said = " ".join(trial.message.split())
-        return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {said}"
+        text = " ".join(trial.message.split())
+        return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {text}"
     alike = "; what follows takes all points to be like it" if at else ""
     if trial.lane_seconds is not None:
         alike = (

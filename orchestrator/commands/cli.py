@@ -85,8 +85,8 @@ app = typer.Typer(
 )
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         say(f"vibroimpact {metadata.version('vibroimpact')}")
         raise typer.Exit
 

@@ -35,7 +35,7 @@ def run_demo(options: Demo) -> None:
         scene = load_scene(path)
     console.print(f"Scene: {scene.title}; {len(scene.sweep[0].values)} frequencies, up and down.")
     report = computed(scene, output)
-    console.print(_told(report, scene))
+    console.print(_summary(report, scene))
     with open_dataset(report.dataset) as dataset:
         figure = output / "bifurcation.png"
         figures.save(figures.draw(dataset, "bifurcation"), figure)
@@ -48,7 +48,7 @@ def run_demo(options: Demo) -> None:
     _refuse_far_readings(readings)
 
 
-def _told(report: CampaignReport, scene: Scene) -> str:
+def _summary(report: CampaignReport, scene: Scene) -> str:
     if not report.chunks:
         return f"All {report.runs} points were there already; delete the folder to compute them again."
     periods = (scene.record.transient_periods or 0) + (scene.record.recorded_periods or 0)

@@ -88,14 +88,14 @@ def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | 
 
 def _to_dataset(scene: Scene, options: Replay, output: Path) -> None:
     began = time.perf_counter()
-    with _fitting(options.fit) as told:
+    with _fitting(options.fit) as progress:
         whole = replay_scene(
             scene,
             options.recordings or (),
             fit=options.fit,
             score=options.score or (),
             execution=options.execution,
-            told=told,
+            progress=progress,
         )
     console = Terminal()
     print_replays(console, whole)

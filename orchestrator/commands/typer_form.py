@@ -69,8 +69,8 @@ def as_function(declared: type[Operation]) -> Callable[..., None]:
     parameters, annotations = [], {}
     for name, kind, default, words in declared.fields():
         form = typer.Argument if isinstance(words, Positional) else typer.Option
-        said = form(*words.names, help=words.help, metavar=words.metavar, min=words.min, max=words.max)
-        annotations[name] = annotated[kind, said]
+        declaration = form(*words.names, help=words.help, metavar=words.metavar, min=words.min, max=words.max)
+        annotations[name] = annotated[kind, declaration]
         given_by = inspect.Parameter.empty if default is MISSING else default
         parameters.append(
             inspect.Parameter(

@@ -135,7 +135,7 @@ class Instance2(Instance):
             if not self._wants_to_end():
                 return status
             self.wants_to_end = self.is_flagged = True
-            self.time = self._end_told(end)
+            self.time = self._reported_end(end)
             return OK
         self.time = end
         return status
@@ -153,7 +153,7 @@ class Instance2(Instance):
         )
         return status == OK and bool(terminated.value)
 
-    def _end_told(self, end: float) -> float:
+    def _reported_end(self, end: float) -> float:
         """Return the end of a discarded step to `end`, s."""
         reached = c_double(math.nan)
         kind = c_int(LAST_SUCCESSFUL_TIME)

@@ -71,7 +71,7 @@ class GuardedRunner(Runner):
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self.scene = scene
-        self._wanted = execution
+        self._execution = execution
         self._folder = ScratchFolder("guard")
         self._child: PointProcess | None = None
         self._points = 0  # number of points that the child has run
@@ -96,7 +96,7 @@ class GuardedRunner(Runner):
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
         self._notes.begin()
-        self._child = PointProcess(Order(self.scene, self._wanted, str(path), self._noting))
+        self._child = PointProcess(Order(self.scene, self._execution, str(path), self._noting))
         try:
             (answer,), _ = self._child.answers(START_TIME)
         except TimeoutError:

@@ -96,11 +96,11 @@ def _wait_for_end(fork: int, guard: int, wakeup: int) -> int | None:
     end = float("inf")
     while (left := end - time.monotonic()) > 0.0:
         ready = dict(poll.poll(1e3 * min(LOOK, left)))
-        told = os.read(wakeup, 4096) if wakeup in ready else b""
+        signals = os.read(wakeup, 4096) if wakeup in ready else b""
         status, _ = _reap(fork)
         if status is not None:
             return status
-        if signal.SIGTERM in told or os.getppid() != guard:
+        if signal.SIGTERM in signals or os.getppid() != guard:
             return None
         if 0 in ready:
             poll.unregister(0)

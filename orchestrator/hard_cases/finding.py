@@ -95,8 +95,8 @@ def _ripple() -> Found:
             **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0, "modes": 8},
             "displacement_start": start.tolist(),
         }
-        asked = {"recorded_time": 1.01 * expected}
-        errors.append(_off_time(expected, body=body, stop=[restitution(0.9, 0.5)], record=asked))
+        record = {"recorded_time": 1.01 * expected}
+        errors.append(_off_time(expected, body=body, stop=[restitution(0.9, 0.5)], record=record))
         ratios.append(rates[fast] / rates[0])
     off = np.array(errors)
     curve = Curve(
@@ -227,7 +227,7 @@ def impacts_by_series(stiffness: Floats, damping: float, w: float, stop: float, 
     exact = np.vectorize(Decimal, otypes=[object])
     rates, state = exact(matrix), exact(np.eye(2 * n + 2)[2 * n])
     grid = np.linspace(0.0, STRIDE, 11)[1:]
-    begun = Decimal(0)
+    start = Decimal(0)
     impacts: list[list[float]] = []
     with localcontext() as context:
         context.prec = DIGITS
@@ -243,9 +243,9 @@ def impacts_by_series(stiffness: Floats, damping: float, w: float, stop: float, 
                 for _ in range(6):  # steps of Newton's method
                     step -= (state[0] - Decimal(stop)) / state[n]
                     state = _summed(series, step)
-                impacts.append([float(begun + step), float(state[n])])
+                impacts.append([float(start + step), float(state[n])])
                 state[0], state[n] = Decimal(stop), -Decimal(r) * state[n]
-            begun += step
+            start += step
     return np.array(impacts)
 
 

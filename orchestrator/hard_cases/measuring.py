@@ -118,15 +118,15 @@ def cases_named(names: Sequence[str]) -> list[HardCase]:
         A name is unknown, or occurs twice.
     """
     known = {case.name: case for case in CASES}
-    asked = _as_texts(names)
-    for name, times in Counter(asked).items():
+    chosen = _as_texts(names)
+    for name, times in Counter(chosen).items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"Did you mean {near[0]}?" if near else f"There are {', '.join(known)}."
             raise UsageError(message(_ONLY, f": expected the name of a hard case, got {name!r}. {hint}"))
         if times > 1:
             raise UsageError(message(_ONLY, f": expected each name once, got {name!r} {times} times."))
-    return [case for case in CASES if not asked or case.name in asked]
+    return [case for case in CASES if not chosen or case.name in chosen]
 
 
 def _as_texts(names: object) -> list[str]:

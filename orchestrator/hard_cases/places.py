@@ -109,7 +109,7 @@ def _rocking() -> Found:
     return Found(largest(off), Curve(loads, off, "load (-)", "residual motion (-)", x_log=True))
 
 
-BESIDE = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
+OFFSETS = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
 """Distances of the stop from the middle of a pinned beam, over its length."""
 COMPARED = 6
 """Compared impacts of each run."""
@@ -119,12 +119,12 @@ OFF_THE_STOP = 1e-4
 
 def _beside_a_node() -> Found:
     """A pinned beam swings in mode 2, and touches a stop next to its middle, where it hardly moves."""
-    off = np.array([_off_beside(0.5 + float(distance)) for distance in BESIDE])
+    off = np.array([_error_at(0.5 + float(distance)) for distance in OFFSETS])
     words = "stop beside the node, each distance"
     return Found(largest(off), Curve(np.arange(1.0, 1.0 + len(off)), off, words, "relative error (-)"))
 
 
-def _off_beside(location: float) -> float:
+def _error_at(location: float) -> float:
     """Return the largest error of time and speed of the first impacts. Mode 1 starts at rest; each impact moves it."""
     angle, r = math.pi * (location - 0.5), 0.8
     shapes = math.sqrt(2.0) * np.array([math.cos(angle), -math.sin(2.0 * angle)])

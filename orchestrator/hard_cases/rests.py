@@ -174,19 +174,21 @@ def _off_bounces(r: float, offset: float, place: float, velocity: float) -> floa
     assert record.impacts is not None
     assert record.sticks is not None
     expected = bounces(*first_impact(place, velocity), r)
-    rests = not math.isnan(expected.rest)
+    comes_to_rest = not math.isnan(expected.rest)
     first = record.impacts[:COMPARED, [IMPACT_TIME, IMPACT_VELOCITY]]
     impacts = np.stack([QUARTER + np.array(expected.phases), expected.speeds], axis=1)[:COMPARED]
-    if first.shape != impacts.shape or (offset >= RESOLVED_OFFSET and bool(len(record.sticks)) != rests):
+    if first.shape != impacts.shape or (
+        offset >= RESOLVED_OFFSET and bool(len(record.sticks)) != comes_to_rest
+    ):
         return math.inf
-    last = (0.0, 0.0) if rests else (expected.phases[-1], r * expected.speeds[-1])
+    last = (0.0, 0.0) if comes_to_rest else (expected.phases[-1], r * expected.speeds[-1])
     end = np.array(released(*last, 3.0 * QUARTER))
     off = [
         relative(first, impacts),
         relative(np.array([record.final_displacement, record.final_velocity]), end),
     ]
     off.append(relative(record.sticks[:1, STICK_END], QUARTER))
-    if rests and offset >= WELL_BEFORE:
+    if comes_to_rest and offset >= WELL_BEFORE:
         off.append(relative(record.sticks[:1, STICK_START], QUARTER + expected.rest))
     return largest(np.concatenate(off, axis=None))
 
@@ -278,8 +280,8 @@ def _off_touch(amplitude: float, w: float) -> float:
         record={"recorded_periods": periods},
     )
     assert record.sticks is not None
-    rests = periods + 1 if amplitude > 1.0 else 1
-    if len(record.sticks) != rests:
+    rest_count = periods + 1 if amplitude > 1.0 else 1
+    if len(record.sticks) != rest_count:
         return math.inf
     return largest(np.abs([record.final_displacement + 1.0, record.final_velocity]))
 

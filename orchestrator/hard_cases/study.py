@@ -32,7 +32,7 @@ VERDICTS = ("wrong", "slow")
 
 
 def _say_measured(one: Measured) -> None:
-    say(f"  {one.case.name}: {_told(one)}", err=True)
+    say(f"  {one.case.name}: {_figure_text(one)}", err=True)
 
 
 @dataclass(eq=False)
@@ -116,7 +116,7 @@ class MeasuredCases(Study[Measured]):
         return [one.case.name for one in self.found if one.verdict == verdict]
 
 
-def _told(one: Measured) -> str:
+def _figure_text(one: Measured) -> str:
     if one.failure:
         return f"did not run: {one.failure}"
     return f"{one.found.figure:.1e}" if one.found.figure else "0"
@@ -128,7 +128,7 @@ def _table(measured: Sequence[Measured]) -> Table:
         rows.add_row(
             one.case.name,
             one.case.title,
-            _told(one),
+            _figure_text(one),
             f"{one.case.bound:.2g}",
             one.case.of,
             duration(one.seconds),

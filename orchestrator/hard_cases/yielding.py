@@ -39,8 +39,8 @@ def _nearly_rigid() -> Found:
         yielding = run(**scene, stop=[kelvin_voigt(0.5, float(stiffness), damping)]).final_displacement
         distances.append(abs(yielding - rigid))
     off = np.array(distances)
-    told = off > 1e-9  # below, the order is dominated by rounding
-    order = float(np.polyfit(np.log(STIFFNESSES[told] ** -0.5), np.log(off[told]), 1)[0])
+    resolved = off > 1e-9  # below, the order is dominated by rounding
+    order = float(np.polyfit(np.log(STIFFNESSES[resolved] ** -0.5), np.log(off[resolved]), 1)[0])
     curve = Curve(
         STIFFNESSES, off, "stiffness (-)", "distance from the rigid stop (-)", x_log=True, is_bounded=False
     )

@@ -279,9 +279,9 @@ class Component:
 
     def watch_inputs(self, names: Iterable[str]) -> None:
         """Name the connected inputs; their slope inputs belong to them."""
-        wanted = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]
+        inputs = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]
         by_kind: dict[str, list[str]] = {}
-        for name in wanted:
+        for name in inputs:
             by_kind.setdefault(kind_of(self.variables[name]), []).append(name)
         self._inputs = [self.group(kind, found) for kind, found in by_kind.items()]
 

@@ -65,11 +65,11 @@ class ContactImpacts:
 
     def part(self, time: float, opening: float) -> None:
         """Note the time (s) and the speed (m/s) at which the bodies part."""
-        begun, self._open = self._open, None
-        if begun is not None:
-            restitution = max(opening, 0.0) / begun.closing if begun.closing > 0.0 else math.nan
-            known = self._impulse, restitution, time - begun.time, self._largest
-            self._ended.append(Impact(*begun[:3], *known))
+        contact, self._open = self._open, None
+        if contact is not None:
+            restitution = max(opening, 0.0) / contact.closing if contact.closing > 0.0 else math.nan
+            known = self._impulse, restitution, time - contact.time, self._largest
+            self._ended.append(Impact(*contact[:3], *known))
 
     @property
     def all(self) -> list[Impact]:

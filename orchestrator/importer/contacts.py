@@ -147,8 +147,8 @@ class ContactBonds:
 
     def remarks(self) -> list[str]:
         """Remarks on the errors of held forces, and on the drift of bodies at rest on each other."""
-        told = [*(bond.remark() for bond in self.held), *(pair.remark() for pair in self.pairs.pairs)]
-        return [text for text in told if text]
+        remarks = [*(bond.remark() for bond in self.held), *(pair.remark() for pair in self.pairs.pairs)]
+        return [text for text in remarks if text]
 
     def free(self) -> None:
         """Free their saved states."""

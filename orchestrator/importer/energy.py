@@ -196,7 +196,7 @@ class InterfaceEnergy:
         bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.ports}
         found: list[tuple[ConnectionSpec, _Connection | _Contact | PlainContact]] = []
         self._plain: list[PlainContact] = []
-        self._begun = [
+        self._starting_forces = [
             ForceThatBegins(importer.components, connection)
             for connection in connections
             if ForceThatBegins.is_one(importer.components, connections, connection)
@@ -221,7 +221,7 @@ class InterfaceEnergy:
         )
         self._connections = [watched for _, watched in found]
         self._specs = [connection for connection, _ in found]
-        if found or self._begun:
+        if found or self._starting_forces:
             importer.watchers.append(StepWatcher(self._before, self._after, self._patience))
 
     def begin(self, connections: Sequence[ConnectionSpec]) -> None:
@@ -229,7 +229,7 @@ class InterfaceEnergy:
         gains = {connection.target: connection.gain for connection in connections}
         for spec, watched in zip(self._specs, self._connections, strict=True):
             watched.begin(gains[spec.target])
-        for force in self._begun:
+        for force in self._starting_forces:
             force.begin()
 
     def residuals(self) -> NDArray[np.float64]:
@@ -238,7 +238,7 @@ class InterfaceEnergy:
 
     def remarks(self) -> list[str]:
         """Remarks on stops whose forces are plain connections."""
-        found = [*(c.remark() for c in self._plain), *(f.remark() for f in self._begun)]
+        found = [*(c.remark() for c in self._plain), *(f.remark() for f in self._starting_forces)]
         return [text for text in found if text]
 
     def free(self) -> None:
@@ -249,7 +249,7 @@ class InterfaceEnergy:
     def _patience(self) -> float:
         """Return an infinite time where all are contacts that press no stop: then no step needs to be seen."""
         is_idle = all(isinstance(c, _Contact) and not c.follows for c in self._connections)
-        return math.inf if is_idle and not self._begun else 0.0
+        return math.inf if is_idle and not self._starting_forces else 0.0
 
     def _before(self, time: float) -> None:
         for watched in self._connections:
@@ -258,5 +258,5 @@ class InterfaceEnergy:
     def _after(self, time: float, end: float) -> None:
         for watched in self._connections:
             watched.after(time, end)
-        for force in self._begun:
+        for force in self._starting_forces:
             force.look()

@@ -52,13 +52,13 @@ class LateEvents:
     ----------
     room : callable
         Returns the number of further events that may pass before it is called.
-    tell : callable
+    report : callable
         Called with the passed events, shape (event, 3): time (s), index among those at the same time, and place of the
         component in `Importer.components`.
     """
 
     room: Callable[[], int]
-    tell: Callable[[NDArray[np.float64]], None]
+    report: Callable[[NDArray[np.float64]], None]
 
 
 #: No event may pass: each is reported when it happens.

@@ -151,7 +151,7 @@ class Importer:
         self.on_event: Callable[[Event], None] | None = None
         self.late_events: LateEvents | None = None
         self.on_pause: Callable[[], None] | None = None
-        self._begun = False
+        self._has_started = False
 
     @property
     def time(self) -> float:
@@ -190,10 +190,10 @@ class Importer:
         self.wants_to_end = False
         for component in self._order:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
-            component.begin(own, start_time, first=not self._begun)
+            component.begin(own, start_time, first=not self._has_started)
             if not component.capabilities.variable_steps and math.isfinite(self.macro_step):
                 component.instance.only_step = self.macro_step
-        self._begun = True
+        self._has_started = True
         settle_connections([*self.transfers, *self.tuning.transfers], self.loops, start_time)
         self.tuning.begin()
         self.ticks.begin(start_time)

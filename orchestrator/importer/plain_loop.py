@@ -223,7 +223,7 @@ class PlainLoop:
         for instance, step in self._stepped:
             instance.take_time(step.time)
         if late is not None and run.events_used:
-            late.tell(self._events[: run.events_used])
+            late.report(self._events[: run.events_used])
         return came_to
 
     def at_event(self) -> list[Component]:

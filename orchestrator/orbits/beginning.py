@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.orbits.seeds import Seed, seed_of_run
 from vibroimpact.orchestrator.scene import Scene
 
 
-class Begun(NamedTuple):
+class OrbitStart(NamedTuple):
     """Scene and orbit to begin with; None for numbers that were not given."""
 
     scene: Scene
@@ -62,7 +62,9 @@ def refuse_contradictions(options: Beginning) -> None:
         raise UsageError(f"--from-dataset: expected it without {', '.join(given)}, which the run says.")
 
 
-def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()) -> Begun:
+def orbit_start(
+    options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()
+) -> OrbitStart:
     """Return the scene without its sweep, at the values of the dataset's run if one is given, and the seed.
 
     The scene has the changes already, each KEY=VALUE. The command varies the keys in `varied`, so values that the
@@ -70,7 +72,7 @@ def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequ
     run. DatasetError: the run has no orbit.
     """
     if options.from_dataset is None:
-        return Begun(scene.unswept(varied), options.impacts, options.periods, _impacts_of(options.seed))
+        return OrbitStart(scene.unswept(varied), options.impacts, options.periods, _impacts_of(options.seed))
     with open_dataset(options.from_dataset) as runs:
         try:
             found = seed_of_run(runs, options.run)
@@ -79,7 +81,7 @@ def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequ
     if twice := sorted(found.values.keys() & {each.partition("=")[0].strip() for each in changes}):
         raise UsageError(f"--set {twice[0]}: expected another key than those the dataset sweeps, got one.")
     alone = scene.unswept([*varied, *found.values])
-    return Begun(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
+    return OrbitStart(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
 
 
 def _impacts_of(seed: str | None) -> Seed | None:

@@ -47,13 +47,13 @@ class BodyFlow:
     def __init__(self, scene: Scene, workers: int | None = None) -> None:
         self.scene = scene
         bare = {**_RECORD, "extrema": False, "strobe": False}
-        told = {**_RECORD, "extrema": True, "strobe": True}
+        record = {**_RECORD, "extrema": True, "strobe": True}
         self._pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
         count = self._pool._max_workers
         self._closing = False
         self._runners: list[PointRunner] = []
         self._bare = [self._loop(bare) for _ in range(count)]
-        self._telling = [self._loop(told) for _ in range(count)]
+        self._recording = [self._loop(record) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
         self.names = scene.body.start_names
 
@@ -88,7 +88,7 @@ class BodyFlow:
         self, states: Floats, transient: int, *, first: bool = False
     ) -> tuple[list[RunClass], Floats]:
         """Return the class of a run from each state after a transient (forcing periods), and its last states."""
-        columns = self._run(self._telling, states, (transient, RECORDED), first=first)
+        columns = self._run(self._recording, states, (transient, RECORDED), first=first)
         found = [kind for each in columns for kind in _classes(each)]
         return found, np.concatenate([_final(each) for each in columns])
 

@@ -113,7 +113,7 @@ class FollowedLoci:
             self.followed.scene,
             [point for each in self.followed.branches for point in each.points],
         )
-        said = (
+        text = (
             f"Curves were begun only where a branch has a {', '.join(FOLLOWED_KINDS[:-1])} or {FOLLOWED_KINDS[-1]} at "
             f"{self.second} = {scene.value(self.second):g}: others, and those that leave points of codimension 2, were "
             f"not looked for. Begin at other values of {self.second} to find more."
@@ -121,8 +121,8 @@ class FollowedLoci:
         others = [point for point in points if point.kind not in FOLLOWED_KINDS]
         if others:
             where = ", ".join(f"{point.kind} at {point.at.value:.8g}" for point in others)
-            said += f" Not followed: {where}."
-        return said
+            text += f" Not followed: {where}."
+        return text
 
 
 def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSettings) -> Iterator[Locus]:
@@ -204,8 +204,8 @@ def follow_branches(
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
-    begun = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
-    for value, orbit in begun:
+    starts = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
+    for value, orbit in starts:
         if not _is_known(followed.branches, orbit, value, settings):
             yield from _both_ways(follower, orbit, value, followed)
     if not followed.branches:

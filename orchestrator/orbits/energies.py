@@ -230,8 +230,8 @@ def _of_one(found: OrbitEnergies, distance: float, attrs: Mapping[str, Any], uni
         "impact_contact": orbit.contacts + 1,
         "transient": distance,
     }
-    said = {"orbit": orbit.name, "is_stable": int(orbit.is_stable)}
-    return TABLE.dataset(values, said | dict(attrs), units=units)
+    attributes = {"orbit": orbit.name, "is_stable": int(orbit.is_stable)}
+    return TABLE.dataset(values, attributes | dict(attrs), units=units)
 
 
 def _on_sweep(
@@ -285,9 +285,9 @@ def _print_one(found: xr.Dataset) -> None:
     )
     masses = ", ".join(f"{each:.6g}" for each in found["contact_mass"].values)
     say(f"Mass that an impact meets{', kg' if unit else ''}: {masses}.")
-    said = residual_restitution(float(found.residual_energy.sum()), met)
-    slope = f", {said.slope:.4g} per unit of residual energy" if np.isfinite(said.slope) else ""
-    say(f"Restitution from the residual energy: {said.problem or f'{said.value:.9g}{slope}'}.")
+    restitution = residual_restitution(float(found.residual_energy.sum()), met)
+    slope = f", {restitution.slope:.4g} per unit of residual energy" if np.isfinite(restitution.slope) else ""
+    say(f"Restitution from the residual energy: {restitution.problem or f'{restitution.value:.9g}{slope}'}.")
     if float(found.transient) > 1e-9:
         say(f"Recorded impacts are {float(found.transient):.1e} from the orbit: a transient is not over.")
     if found.sizes["mode"] <= _MOST_SHOWN:

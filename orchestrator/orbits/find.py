@@ -23,7 +23,7 @@ from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.orbit import FindOrbits
-from vibroimpact.orchestrator.orbits.beginning import begun, files_of, refuse_contradictions
+from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.provenance import scene_attributes
@@ -70,7 +70,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
         """Open the scene, at the values of the run that is on the orbit."""
         refuse_contradictions(options)
         changes = options.changes or ()
-        first = begun(options, opened_scene(options.scene, changes, for_orbits=True), changes)
+        first = orbit_start(options, opened_scene(options.scene, changes, for_orbits=True), changes)
         return cls(first.scene, first.impacts, first.periods, first.seed, options.penetrating)
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
@@ -118,7 +118,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             f"Periodic orbits: {self.scene.title or self.scene.source}",
             *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
             *("<largest multipliers", ">determinant, off by", ">nearest maximum"),
-            rows=map(_told, self.found),
+            rows=map(_row, self.found),
         )
         if self.found:
             wide_terminal().print(rows)
@@ -215,7 +215,7 @@ def orbit_of_impacts(body: ImpactingBody, rows: Floats | None) -> PeriodicOrbit 
     return None
 
 
-def _told(orbit: PeriodicOrbit) -> tuple[str, ...]:
+def _row(orbit: PeriodicOrbit) -> tuple[str, ...]:
     off = orbit.determinant / orbit.exact_determinant - 1.0 if orbit.exact_determinant > 0.0 else np.nan
     return (
         orbit.name,

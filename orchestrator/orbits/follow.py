@@ -19,7 +19,7 @@ from vibroimpact.fmus.messages import counted, typed
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.follow import Follow
-from vibroimpact.orchestrator.orbits.beginning import begun, files_of, refuse_contradictions
+from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
 from vibroimpact.orchestrator.orbits.branches import (
     HISTORY,
     Followed,
@@ -75,7 +75,7 @@ class Following(Study[str]):
         refuse_contradictions(options)
         changes, second_range = options.changes or (), _second_range(options)
         opened = opened_scene(options.scene, changes, for_orbits=True)
-        first = begun(options, opened, changes, [options.parameter])
+        first = orbit_start(options, opened, changes, [options.parameter])
         return cls(
             *(first.scene, options.parameter, options.start, options.stop),
             impacts=first.impacts,

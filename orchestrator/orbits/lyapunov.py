@@ -69,8 +69,8 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
         reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
         counts = _counted([text for text in reasons if text])
         if all(reasons):
-            told = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
-            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {told}")
+            summary = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
+            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {summary}")
         _print(self.dataset)
         for words, count in counts:
             say(f"{count} without: {words}")
@@ -182,8 +182,8 @@ def _print(found: xr.Dataset) -> None:
 
 
 def _where(one: xr.Dataset, found: xr.Dataset) -> str:
-    told = []
+    texts = []
     for name in (str(dim) for dim in found.reason.dims if str(dim) in one.coords):
         value = one[name].item()
-        told.append(f"{name} {value:.6g}" if isinstance(value, float) else str(value))
-    return ", ".join(told)
+        texts.append(f"{name} {value:.6g}" if isinstance(value, float) else str(value))
+    return ", ".join(texts)

@@ -229,7 +229,7 @@ class MapOfScene(Study[str]):
 
     def print_results(self) -> None:
         """Print a summary of the map."""
-        _tell(self.dataset)
+        _print_map(self.dataset)
 
     def _of_impacts(self, scene: Scene) -> Generator[str, None, None]:
         body = impacting_body(scene)
@@ -367,10 +367,10 @@ def _settings(options: Maps) -> MapSettings:
     )
 
 
-def _tell(found: xr.Dataset) -> None:
+def _print_map(found: xr.Dataset) -> None:
     kind = found.attrs["map"]
     if kind in ("nordmark", "square-root"):
-        _tell_diagram(found, "rho" if kind == "nordmark" else "d")
+        _print_diagram(found, "rho" if kind == "nordmark" else "d")
         return
     say(f"{counted(found.sizes['state'], 'state' if kind == 'strobe' else 'impact')} of a run.")
     for name in found["orbit_name"].values:
@@ -382,7 +382,7 @@ def _tell(found: xr.Dataset) -> None:
         )
 
 
-def _tell_diagram(found: xr.Dataset, name: str) -> None:
+def _print_diagram(found: xr.Dataset, name: str) -> None:
     if name == "rho":
         numbers = {key: float(found.attrs[key]) for key in ("alpha", "gamma", "restitution")}
         say(", ".join(f"{key} {value:.8g}" for key, value in numbers.items()) + ".")

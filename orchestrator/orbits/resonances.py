@@ -43,7 +43,7 @@ TABLE = ResultTable(
     ("mode", "mode", "1", "number of the mode, the slowest first"),
 )
 _KEYS = {"forcing.angular_frequency": 1.0, "forcing.frequency": 2.0 * np.pi}
-_SAME = 1e-9
+_AGREEMENT = 1e-9
 
 
 class _Found(NamedTuple):
@@ -166,7 +166,7 @@ def _peaks(curves: Mapping[str, Floats], frequency: Floats) -> list[_Found]:
 def _shifted(ratio: Floats, body: ImpactingBody) -> Floats:
     """Return the natural frequencies shifted by a stop, shape (peak, mode)."""
     shifted = np.full((ratio.size, body.frequencies.size), np.nan)
-    known = (ratio > -1.0) & (ratio <= 1.0 + _SAME)
+    known = (ratio > -1.0) & (ratio <= 1.0 + _AGREEMENT)
     shifted[known] = frequency_shift(ratio[known])[:, None] * body.frequencies
     return shifted
 
@@ -212,7 +212,7 @@ def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: 
     side = "displacement_min" if contact.direction > 0.0 else "displacement_max"
     nothing = np.full((dataset["outcome"].size // count, count), np.nan)
     size = float(np.abs(contact.shape).max())
-    if side not in dataset or np.abs(contact.shape - body.observed).max() > _SAME * size:
+    if side not in dataset or np.abs(contact.shape - body.observed).max() > _AGREEMENT * size:
         return nothing
     rest = contact.direction * float(contact.shape @ (body.held / body.frequencies**2))
     extreme = dataset[side] if "period" not in dataset[side].dims else dataset[side].min("period")
@@ -226,11 +226,11 @@ def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: 
 def _motions(exchanged: xr.Dataset, order: list[str]) -> np.ndarray[tuple[int, ...], np.dtype[np.object_]]:
     impacts, periods = (exchanged[name].transpose(*order).values for name in ("impacts", "periods"))
     reasons = exchanged["reason"].transpose(*order).values
-    told = [
+    texts = [
         f"P({p:.0f},{q:.0f})" if np.isfinite(p) else str(reason).split(":")[0]
         for p, q, reason in zip(impacts.ravel(), periods.ravel(), reasons.ravel(), strict=True)
     ]
-    return np.array(told, dtype=object)
+    return np.array(texts, dtype=object)
 
 
 def _cells(found: xr.Dataset) -> Iterator[tuple[str, ...]]:

@@ -67,7 +67,7 @@ FORGOTTEN, ELSEWHERE, SHIFTED, CHAOTIC, SLOW, LOST = (
 )
 
 
-class Told(NamedTuple):
+class Verdicts(NamedTuple):
     """Classes of all motions, the scene's own first, and the end of each start."""
 
     motions: list[str]
@@ -119,10 +119,10 @@ class Transients(Study[Floats]):
                 if not (distances > FURTHER * self.tolerance).any():
                     break
                 if period + 1 in LOOKS:
-                    self._told = self._what_became(flow, states)
-                    if SLOW not in self._told.ends and CHAOTIC not in self._told.ends:
+                    self._verdicts = self._what_became(flow, states)
+                    if SLOW not in self._verdicts.ends and CHAOTIC not in self._verdicts.ends:
                         return
-            self._told = self._what_became(flow, states)
+            self._verdicts = self._what_became(flow, states)
         finally:
             flow.close()
 
@@ -157,27 +157,27 @@ class Transients(Study[Floats]):
         distances = np.array(self.found).T
         after = [_after(row, self.tolerance) for row in distances]
         ends = [FORGOTTEN if math.isfinite(each) else SLOW for each in after]
-        told = Told(["unknown"] * (self.starts + 1), ends) if self.incomplete else self._told
+        verdicts = Verdicts(["unknown"] * (self.starts + 1), ends) if self.incomplete else self._verdicts
         values = {
             "period": np.arange(distances.shape[1]),
             "distance": distances,
             "first_distance": self._first,
             "forgotten_after": after,
             "contraction": [_contraction(row) for row in distances],
-            "motion": told.motions[1:],
-            "end": told.ends,
+            "motion": verdicts.motions[1:],
+            "end": verdicts.ends,
         }
         attributes = scene_attributes(self.scene, HISTORY) | {
             "units_system": self.scene.units,
             "tolerance": self.tolerance,
             "linear_contraction": self.linear_contraction,
-            "motion": told.motions[0],
+            "motion": verdicts.motions[0],
             "period_length": self.body.period,
             "period_of": "the force" if self.is_forced else "the first mode",
         }
         return TABLE.dataset(values, attributes, units=self.scene.units)
 
-    def _what_became(self, flow: BodyFlow, states: Floats) -> Told:
+    def _what_became(self, flow: BodyFlow, states: Floats) -> Verdicts:
         """Return the class of each motion, and the end of each start, by runs from the present states."""
         (own, *others), last = flow.classes(states, 0)
         orbit = [last[0]]
@@ -188,7 +188,7 @@ class Transients(Study[Floats]):
             self._end(distances[:, place], own, kind, (last[place + 1] - np.array(orbit)) / self._scale)
             for place, kind in enumerate(others)
         ]
-        return Told([kind.name for kind in (own, *others)], ends)
+        return Verdicts([kind.name for kind in (own, *others)], ends)
 
     def _end(self, distances: Floats, own: RunClass, kind: RunClass, apart: Floats) -> str:
         """Return the end of a start.

@@ -35,7 +35,7 @@ MOST_CONDITION = 1e8
 #: Relative effect of doubling a number below which it is treated as having none.
 LEAST_CHANGE = 1e-9
 #: Offset of a second start from a start without effect, relative to the larger of a number and its scale.
-BESIDE = 0.1
+NEIGHBOUR_DISTANCE = 0.1
 #: Squared distance of a number from its flat value, in standard errors of the square; below it the two are not
 #: distinct.
 FLAT_ERRORS = 3.0
@@ -116,7 +116,7 @@ def fit_replay(
     replayers: Sequence[Replayer],
     keys: Sequence[str],
     *,
-    told: Callable[[int, float], None] = lambda simulations, error: None,
+    progress: Callable[[int, float], None] = lambda simulations, error: None,
 ) -> ReplayFit:
     """Fit numbers of a scene to recordings.
 
@@ -126,7 +126,7 @@ def fit_replay(
         Replayers of one scene, one for each recording; the scene compares something.
     keys : sequence of str
         Numbers of the scene to fit; the scene has their start values.
-    told : callable
+    progress : callable
         Called after each simulation with the number of simulations and the root-mean-square error (1: the mean's).
 
     Raises
@@ -136,14 +136,14 @@ def fit_replay(
     EstimationError
         A number has no effect on the data, or the search does not end.
     """
-    return _Fit(replayers, tuple(keys), told).run()
+    return _Fit(replayers, tuple(keys), progress).run()
 
 
 class _Fit:
     def __init__(
-        self, replayers: Sequence[Replayer], keys: tuple[str, ...], told: Callable[[int, float], None]
+        self, replayers: Sequence[Replayer], keys: tuple[str, ...], progress: Callable[[int, float], None]
     ) -> None:
-        self.replayers, self.keys, self.told = replayers, keys, told
+        self.replayers, self.keys, self.progress = replayers, keys, progress
         scene = replayers[0].scene
         if not replayers[0].readings:
             raise UsageError(
@@ -162,8 +162,8 @@ class _Fit:
         values, remarks = self.start.copy(), []
         comparisons = self.compared(values)
         values, comparisons = self.better_start(values, comparisons)
-        values, comparisons, told = self.start_with_effect(values, comparisons)
-        remarks += told
+        values, comparisons, new_remarks = self.start_with_effect(values, comparisons)
+        remarks += new_remarks
         self.refuse_alike(self._slopes(values, comparisons))  # before a search that would fail
         alignments = 0
         while alignments < MOST_ALIGNMENTS:
@@ -210,35 +210,37 @@ class _Fit:
         nothing moves or is read (a gain of 0), no other number has an effect: the numbers with an effect are fitted
         first.
         """
-        values, told = self._beside_idle(values, comparisons)
+        values, new_remarks = self._away_from_idle(values, comparisons)
         idle = self._idle(self._slopes(values, comparisons))
         if idle.any() and not idle.all():
             values = self.solve(values, comparisons, ~idle)
             comparisons = self.compared(values)
             late = ", ".join(self.keys[place] for place in np.flatnonzero(idle))
-            told.append(f"{late}: without effect where the search began; the other numbers were found first")
-            values, more = self._beside_idle(values, comparisons)
-            told += more
-        return values, comparisons, told
+            new_remarks.append(
+                f"{late}: without effect where the search began; the other numbers were found first"
+            )
+            values, more = self._away_from_idle(values, comparisons)
+            new_remarks += more
+        return values, comparisons, new_remarks
 
-    def _beside_idle(
+    def _away_from_idle(
         self, values: Floats, comparisons: Sequence[Sequence[Comparison]]
     ) -> tuple[Floats, list[str]]:
-        told = []
+        new_remarks = []
         for place in np.flatnonzero(self._idle(self._slopes(values, comparisons))).tolist():
             tried = [
                 (sum(float(one @ one) for one in self.residuals(other, comparisons)), float(other[place]))
-                for other in self._beside(values, place)
+                for other in self._neighbours(values, place)
                 if not self._idle(self._slopes(other, comparisons))[place]
             ]
             if tried:
-                told.append(
+                new_remarks.append(
                     f"{self.keys[place]} has no effect at {values[place]:.6g}: the search began beside it, at "
                     f"{min(tried)[1]:.6g}"
                 )
                 self.flat[place] = float(values[place])
                 values = np.where(np.arange(len(values)) == place, min(tried)[1], values)
-        return values, told
+        return values, new_remarks
 
     def _idle(self, slopes: Sequence[Floats]) -> Flags:
         """Return a mask of numbers that do not change the compared signals beyond rounding, shape (key,)."""
@@ -247,9 +249,9 @@ class _Fit:
         idle: Flags = ~(moved > LEAST_CHANGE)
         return idle
 
-    def _beside(self, values: Floats, place: int) -> list[Floats]:
+    def _neighbours(self, values: Floats, place: int) -> list[Floats]:
         """Return the values with one number a little larger, and a little smaller, within its bounds."""
-        step = BESIDE * self.scale[place] * np.eye(len(values))[place]
+        step = NEIGHBOUR_DISTANCE * self.scale[place] * np.eye(len(values))[place]
         both = (values + step, values - step)
         return [other for other in both if self.lower[place] < other[place] < self.upper[place]]
 
@@ -281,7 +283,7 @@ class _Fit:
                 simulated = comparison.alignment.polarity * Interpolated(motion.time, reading)(at)
                 measured = comparison.values[comparison.scored]
                 found.append((measured - simulated) / np.std(measured))
-        self.told(self.simulations, float(np.sqrt(np.mean(np.concatenate(found) ** 2))))
+        self.progress(self.simulations, float(np.sqrt(np.mean(np.concatenate(found) ** 2))))
         return found
 
     def solve(

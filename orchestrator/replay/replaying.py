@@ -57,7 +57,7 @@ def replay_scene(
     fit: str | None = None,
     score: Sequence[Path] = (),
     execution: str | None = None,
-    told: Callable[[int, float], None] = lambda simulations, error: None,
+    progress: Callable[[int, float], None] = lambda simulations, error: None,
 ) -> WholeReplay:
     """Drive a scene by recordings and compare its motion with measured channels.
 
@@ -73,7 +73,7 @@ def replay_scene(
         Recordings to score without fitting.
     execution : str, optional
         `auto`, `fused` or `coupled`; None: as in the scene.
-    told : callable, optional
+    progress : callable, optional
         Called during a fit with the number of simulations, and the relative error of the best one.
 
     Raises
@@ -105,7 +105,7 @@ def replay_scene(
     # a number at its default in the scene counts as written from now on
     scene = scene.at({key: scene.value(key) for key in keys})
     with opened_replays(scene, [*paths, *score], execution or scene.execution.how) as replayers:
-        found = fit_replay(replayers[: len(paths)], keys, told=told) if keys else None
+        found = fit_replay(replayers[: len(paths)], keys, progress=progress) if keys else None
         replays, verdict = _judged(scene, replayers, found, len(paths))
         return WholeReplay(named, replays, found, verdict, replay_dataset(replays, found, verdict))
 

@@ -75,12 +75,14 @@ class ReplayRunner(Runner):
     ) -> RunRecord:
         displacement, velocity, state = replayer.final_state()
         # remarks on skipped samples are equal for all points; remarks on a doubtful alignment are not
-        doubts = [f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks]
-        told = [*motion.warnings, *doubts]
+        alignment_remarks = [
+            f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks
+        ]
+        remarks = [*motion.warnings, *alignment_remarks]
         impacts = self.scene.record.impacts
         return RunRecord(
             outcome=Outcome.ok,
-            message="; ".join(told),
+            message="; ".join(remarks),
             impacts=motion.impacts if impacts else None,
             sticks=motion.sticks if impacts else None,
             final_displacement=displacement,

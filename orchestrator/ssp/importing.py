@@ -88,9 +88,9 @@ def load_system(
     name = _PLAIN.sub("_", FilePath(path).stem)[:100] if name is None else name
     source = str(place / f"{name}.toml")
     try:
-        with _told_of(FilePath(path), source), SspArchive(FilePath(path)) as archive:
+        with _named_in_errors(FilePath(path), source), SspArchive(FilePath(path)) as archive:
             sets = [FilePath(one) for one in parameters]
-            tables, notes = _read(archive, place / f"{name}_fmus", sets, _asked_end(changes))
+            tables, notes = _read(archive, place / f"{name}_fmus", sets, _given_end(changes))
             scene = parse_scene(_text(tables), source, changes)
     except BaseException:
         folder.cleanup()
@@ -170,7 +170,7 @@ def _refuse_another(file: FilePath, content: bytes, force: bool) -> None:
 
 
 @contextmanager
-def _told_of(path: FilePath, source: str) -> Iterator[None]:
+def _named_in_errors(path: FilePath, source: str) -> Iterator[None]:
     """Replace the unpacked path by the archive's in messages."""
     place = str(FilePath(source).parent)
     try:
@@ -187,15 +187,15 @@ def _told_of(path: FilePath, source: str) -> Iterator[None]:
         raise ComponentFileError(str(error).replace(f"{place}/", f"{path}: ")) from None
 
 
-def _asked_end(changes: Sequence[str]) -> float | None:
+def _given_end(changes: Sequence[str]) -> float | None:
     """Return the end of the run from the changes, if a system leaves it open."""
     key = "record.recorded_time"
     document, changed = changed_document({}, [one for one in changes if one.startswith(key)])
     if key not in changed:
         return None
-    asked = document["record"]["recorded_time"]
+    given = document["record"]["recorded_time"]
     # the scene's rules report other types
-    return float(asked) if isinstance(asked, int | float) and abs(asked) < 1e300 else 0.0
+    return float(given) if isinstance(given, int | float) and abs(given) < 1e300 else 0.0
 
 
 def _read(

@@ -133,7 +133,7 @@ def analysed(
     highest, lowest = (_grouped(each, settings) for each in (highest, lowest))
     drive = _drive(step, settings)
     recorded = step.volts[:, edges[0] : edges[-1]]
-    flags, said = MeasurementFlag(0), []
+    flags, reasons = MeasurementFlag(0), []
     # comparisons with NaN are false
     clipped = [
         each.name
@@ -142,16 +142,16 @@ def analysed(
     ]
     if clipped:
         flags |= MeasurementFlag.clipped
-        said.append(f"{' and '.join(clipped)} at the end of the range")
+        reasons.append(f"{' and '.join(clipped)} at the end of the range")
     if lost := int(np.isnan(recorded[place]).sum()):
         flags |= MeasurementFlag.gap
-        said.append(f"{lost} of {recorded.shape[1]} samples lost")
+        reasons.append(f"{lost} of {recorded.shape[1]} samples lost")
     if drift := _drift(highest, lowest, settings.sweep.drift):
         flags |= MeasurementFlag.drift
-        said.append(f"{drift} while it was recorded")
+        reasons.append(f"{drift} while it was recorded")
     if wrong := _wrong_drive(drive, settings):
         flags |= MeasurementFlag.starved
-        said.append(wrong)
+        reasons.append(wrong)
     late = drive.late((0.5 * (edges[0] + edges[-1]) - 0.5 * segment.count) / rate)
     return MeasuredStep(
         segment.place,
@@ -160,7 +160,7 @@ def analysed(
         _strobe(displacement, segment, settings, late * rate),
         _impacts(step, settings, edges),
         flags,
-        "; ".join(said),
+        "; ".join(reasons),
         drive,
         float(displacement[-1]),
     )

@@ -55,8 +55,8 @@ def _inline(settings: SweepSettings) -> dict[str, Calibration]:
         if one is not None:
             found[name] = one
             if one.terminal not in ("", terminals[name]):
-                wanted = f"{terminals[name]}, where {name} is measured"
-                problems.append(Problem(f"calibration.{name}.terminal", wanted, quoted(one.terminal)))
+                expected = f"{terminals[name]}, where {name} is measured"
+                problems.append(Problem(f"calibration.{name}.terminal", expected, quoted(one.terminal)))
     if problems:
         raise UsageError("\n".join(lines_of(problems, settings.source)))
     return found

@@ -48,7 +48,7 @@ class SweepRows:
     """The first steps of the path, in its order."""
     made_by: dict[str, str] = field(default_factory=dict)
     """`rig`, `device` and `measured_at`, with a line for each start or continuation."""
-    begun_with: list[int] = field(default_factory=list)
+    session_starts: list[int] = field(default_factory=list)
     """Number of steps at each of these starts."""
 
     @property
@@ -60,7 +60,7 @@ class SweepRows:
 def dataset_of(rows: SweepRows) -> xr.Dataset:
     """Return the one-dimensional dataset of the finished steps, a run for each step."""
     settings, steps = rows.settings, rows.steps
-    asked = settings.steps[: len(steps)]
+    done = settings.steps[: len(steps)]
     measured: dict[str, Any] = {"measurement_flags": [int(step.flags) for step in steps]}
     if settings.place_of("drive") is not None:
         drives = [step.drive for step in steps]
@@ -70,8 +70,8 @@ def dataset_of(rows: SweepRows) -> xr.Dataset:
     omitted = ["impacts_per_period"] if settings.place_of("load_cell") is None else []
     return build_dataset(
         [_record(step, settings) for step in steps],
-        coordinates={"frequency": np.array([frequency for _, frequency in asked], dtype=np.float64)},
-        direction=[direction for direction, _ in asked],
+        coordinates={"frequency": np.array([frequency for _, frequency in done], dtype=np.float64)},
+        direction=[direction for direction, _ in done],
         run_index=range(len(steps)),
         unit_of={"frequency": "Hz"},
         omit=omitted,
@@ -114,20 +114,20 @@ def _attributes(rows: SweepRows) -> dict[str, Any]:
         "sweep_content": json.dumps(settings.content),
         "calibration": rows.calibration,
         "steps_planned": len(settings.steps),
-        "begun_with_steps": json.dumps(rows.begun_with),
+        "begun_with_steps": json.dumps(rows.session_starts),
         **rows.made_by,
     }
-    error, doubt = clock_error_of(_seen_lags(rows))
+    error, standard_error = clock_error_of(_seen_lags(rows))
     if np.isfinite(error):
-        attributes |= {"clock_error_ppm": error, "clock_error_standard_error_ppm": doubt}
+        attributes |= {"clock_error_ppm": error, "clock_error_standard_error_ppm": standard_error}
     return attributes
 
 
 def _seen_lags(rows: SweepRows) -> list[SeenLags]:
     """Return the lags that each acquisition has measured; its plan gives their times."""
     found = []
-    ends = [*rows.begun_with[1:], len(rows.steps)]
-    for begin, end in zip(rows.begun_with, ends, strict=True):
+    ends = [*rows.session_starts[1:], len(rows.steps)]
+    for begin, end in zip(rows.session_starts, ends, strict=True):
         plan = planned(rows.settings, begin)
         middles = {s.place: (s.first + 0.5 * s.count) / plan.rate for s in plan.segments if s.kind == "step"}
         some = rows.steps[begin:end]
@@ -181,7 +181,7 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
         ) from error
     rows.steps = _steps_of(flat)
     rows.made_by = {name: str(flat.attrs[name]) for name in ("rig", "device", "measured_at")}
-    rows.begun_with = [int(steps) for steps in json.loads(str(flat.attrs["begun_with_steps"]))]
+    rows.session_starts = [int(steps) for steps in json.loads(str(flat.attrs["begun_with_steps"]))]
     return rows
 
 

@@ -112,15 +112,15 @@ def planned(settings: SweepSettings, finished: int = 0) -> Plan:
     so that the motion is on its former branch. The last of them is repeated in full, to check this.
     """
     steps, sweep = settings.steps, settings.sweep
-    asked: list[tuple[Kind, int, float, int]] = [("rise", -1, steps[0][1], settings.output.ramp_periods)]
+    pieces: list[tuple[Kind, int, float, int]] = [("rise", -1, steps[0][1], settings.output.ramp_periods)]
     for place, (_, frequency) in enumerate(steps):
         kind: Kind = "step" if place >= finished else "repeat" if place == finished - 1 else "pass"
         periods = sweep.resume_periods if kind == "pass" else settings.step_periods
-        asked.append((kind, place, frequency, periods))
-    asked.append(("fall", -1, steps[-1][1], settings.output.ramp_periods))
+        pieces.append((kind, place, frequency, periods))
+    pieces.append(("fall", -1, steps[-1][1], settings.output.ramp_periods))
     segments: list[Segment] = []
     first = phase = 0
-    for kind, place, frequency, periods in asked:
+    for kind, place, frequency, periods in pieces:
         increment = round(Fraction(frequency) / Fraction(settings.output.rate) * CYCLE)
         count = _samples_to(periods, phase, increment)
         segments.append(Segment(kind, place, first, count, increment, phase))

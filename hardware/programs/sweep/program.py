@@ -38,7 +38,7 @@ from vibroimpact.hardware.rig.output import Output, start_trigger
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
 from vibroimpact.orchestrator.run.progress import Progress
 
-_SURE_SECONDS = 1.0
+_SETTLED_SECONDS = 1.0
 """Time, besides that of a fall from the highest voltage, after which a step is sure, s."""
 _RATE_ROUNDING = 1e-9
 
@@ -154,13 +154,13 @@ class _Sweep:
     def _note_start(self, facts: Facts) -> None:
         earlier = self._rows.made_by.get("measured_at", "")
         self._rows.made_by["measured_at"] = "\n".join(filter(None, (earlier, facts.started_at)))
-        self._rows.begun_with.append(len(self._rows.steps))
+        self._rows.session_starts.append(len(self._rows.steps))
 
     def _follow(self, inputs: Acquisition, output: Output) -> None:
         """Take the samples of the inputs, and keep the sure steps."""
         collector = StepCollector(self._plan, len(self._settings.inputs))
         fall = self._limits.fall(self._limits.amplitude, self._settings.output.rate)
-        margin = fall.samples + round(_SURE_SECONDS * self._settings.output.rate)
+        margin = fall.samples + round(_SETTLED_SECONDS * self._settings.output.rate)
         for block in inputs.blocks():
             for step in collector.take(block.first, block.volts):
                 self._analyse(step)
@@ -176,9 +176,9 @@ class _Sweep:
         else:
             self._waiting.append((step.segment.stop, found))
 
-    def _keep(self, sure: int) -> None:
+    def _keep(self, settled: int) -> None:
         """Store the steps that have ended before a sample."""
-        while self._waiting and self._waiting[0][0] <= sure:
+        while self._waiting and self._waiting[0][0] <= settled:
             _, step = self._waiting.popleft()
             self._rows.steps.append(step)
             with writing(self._folder / DATASET):
@@ -193,5 +193,5 @@ class _Sweep:
     @property
     def _is_a_diagram(self) -> bool:
         """Whether more than one frequency is measured."""
-        asked = self._settings.steps[: len(self._rows.steps)]
-        return len({frequency for _, frequency in asked}) > 1
+        done = self._settings.steps[: len(self._rows.steps)]
+        return len({frequency for _, frequency in done}) > 1

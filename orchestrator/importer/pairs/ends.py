@@ -58,7 +58,7 @@ class PortEnd:
         self._direction = -1.0 if int(self._side.get()[0]) == LOWER_SIDE else 1.0
         self._input.parts.clear()
 
-    def asked_rate(self, time: float, size: float) -> float:
+    def required_rate(self, time: float, size: float) -> float:
         """Return 0: the body gives all its rates itself (`BodyRate`)."""
         return 0.0
 
@@ -115,7 +115,7 @@ class PointEnd:
         if self.pulse is not None:
             self.pulse.begin(time)
 
-    def asked_rate(self, time: float, size: float) -> float:
+    def required_rate(self, time: float, size: float) -> float:
         """Return the body's fastest rate, rad/s, by trials of at most `size` s; 0 for a slower body.
 
         With a yielding law the steps follow from the given mass: trials check that mass, and no rate is needed.
@@ -158,7 +158,7 @@ class SurfaceEnd:
     def begin(self, time: float) -> None:
         """Start a run at `time`, s."""
 
-    def asked_rate(self, time: float, size: float) -> float:
+    def required_rate(self, time: float, size: float) -> float:
         """Return 0: a surface has no rate."""
         return 0.0
 

@@ -35,9 +35,9 @@ from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 #: corrects smaller speeds.
 HIT_AT_REST = 1e-4
 #: Overlap in touching distances, above which bodies with impacts are pressed together.
-SUNK = 100.0
+PRESSED_OVERLAP = 100.0
 #: Overlap at the end of a step, relative to the largest displacement, above which bodies are pressed together.
-DEEP = 1e-3
+PRESSED_END_OVERLAP = 1e-3
 #: Longest step, as a part of the shortest period of a body that states its periods.
 PART_OF_PERIOD = 0.125
 #: A step of two bodies that rest on each other is shorter by this factor.
@@ -45,13 +45,13 @@ RESTING_STEPS = 16.0
 #: Time of all bounces still to come, relative to the longest bounce, below which they are summed to their end.
 ACCUMULATED = 1e-3
 #: Closing speed times duration of a bounce, in touching distances, below which there is no bounce.
-LOW = 64.0
+LEAST_BOUNCE = 64.0
 #: Duration over the longest step, and closing speed over the largest speed: a bounce is small with both below this
 #: part. After `MOST_SMALL_BOUNCES` of them in a row elastic bodies are pressed together.
-SMALL = 1e-3
+SMALL_BOUNCE = 1e-3
 MOST_SMALL_BOUNCES = 1000
 #: Distance of bodies at rest on each other, relative to the largest displacement, above which a remark reports it.
-TOLD_DISTANCE = 1e-9
+REPORTED_DISTANCE = 1e-9
 #: Length of a step over its limit as known at its end, above which the step is shortened.
 SLACK = 1.5
 
@@ -189,7 +189,7 @@ class Pair:
 
     def _ask_bodies(self, time: float, size: float) -> None:
         """Find the fastest rates of other tools' bodies by trials, before their first step."""
-        rate = max(end.asked_rate(time, size) for end in (self.lower, self.upper))
+        rate = max(end.required_rate(time, size) for end in (self.lower, self.upper))
         if rate > 0.0:
             self._longest = min(self._longest, PART_OF_PERIOD * 2.0 * math.pi / rate)
         self._is_new = False
@@ -251,7 +251,7 @@ class Pair:
         ComponentError: the bodies overlap deeply, as the forces of several bodies at rest did not agree.
         """
         end = self._time + size
-        deep = DEEP * max(self._scale.displacement, self._held_back()) + self._room
+        deep = PRESSED_END_OVERLAP * max(self._scale.displacement, self._held_back()) + self._room
         if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
         if self.closed and self.yields:
@@ -276,10 +276,10 @@ class Pair:
 
     def remark(self) -> str:
         """Return a remark on the overlap and opening of bodies at rest; empty where both are small."""
-        if not max(self._overlap, self._opening) > TOLD_DISTANCE * self._scale.displacement:
+        if not max(self._overlap, self._opening) > REPORTED_DISTANCE * self._scale.displacement:
             return ""
-        told = f"overlap by up to {self._overlap:.2g} m and part by up to {self._opening:.2g} m"
-        return f"{self.name}: bodies at rest on each other {told}. Use a shorter macro_step"
+        distances = f"overlap by up to {self._overlap:.2g} m and part by up to {self._opening:.2g} m"
+        return f"{self.name}: bodies at rest on each other {distances}. Use a shorter macro_step"
 
     def _touches(self, now: Motion) -> bool:
         return now.gap < -self._room or (now.gap <= self._room and now.closing > 0.0)
@@ -350,8 +350,8 @@ class Pair:
 
     def is_pressed(self, now: Motion, time: float) -> bool:
         """Return whether the bodies overlap, or have made many successive small bounces."""
-        is_sunk = now.gap < -SUNK * self._scale.room(time) and not self._force.resting
-        return is_sunk or self._small_bounces > MOST_SMALL_BOUNCES
+        overlaps = now.gap < -PRESSED_OVERLAP * self._scale.room(time) and not self._force.resting
+        return overlaps or self._small_bounces > MOST_SMALL_BOUNCES
 
     def _accumulates(self, now: Motion, time: float) -> bool:
         """Are the bounces still to come short in sum, or no higher than the touching distance?"""
@@ -359,12 +359,14 @@ class Pair:
         self._last_impact, self._last_flight = time, flight
         if math.isfinite(flight):
             self._longest_flight = max(self._longest_flight, flight)
-        is_small = flight < SMALL * self._longest_step and now.closing < SMALL * self._scale.speed
+        is_small = (
+            flight < SMALL_BOUNCE * self._longest_step and now.closing < SMALL_BOUNCE * self._scale.speed
+        )
         self._small_bounces = self._small_bounces + 1 if is_small else 0
         if self.restitution in (0.0, 1.0):
             return self.restitution == 0.0
         shrinks = flight < 0.5 * (1.0 + self.restitution) * before
         longest = min(self._longest, self._longest_flight)
         left = flight * self.restitution / (1.0 - self.restitution)
-        low = now.closing * flight < LOW * self._scale.room(time)
+        low = now.closing * flight < LEAST_BOUNCE * self._scale.room(time)
         return low or (shrinks and left < ACCUMULATED * longest)

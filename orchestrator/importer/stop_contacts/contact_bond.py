@@ -81,8 +81,8 @@ class ContactBond:
         self.gives_slopes = any(self._answers[last] is not None for last in (STIFFNESS, DAMPING))
         """The stop answers with slopes."""
         found = [connection for connection in self._answers.values() if connection is not None]
-        self._asked = self.stop.group("Float64", [c.source[1] for c in found])
-        self._told = list(self._answers.values())
+        self._stop_outputs = self.stop.group("Float64", [c.source[1] for c in found])
+        self._connections = list(self._answers.values())
         self._outputs = self.body.group("Float64", [f"{self.port}.{last}" for last in PORT_OUTPUTS])
         self._line = self.body.group("Float64", [f"{self.port}.{x}" for x in (FORCE, STIFFNESS, DAMPING)])
         self._law = self.body.group("Int64", [f"{self.port}.law", f"{self.port}.side"])
@@ -125,7 +125,7 @@ class ContactBond:
             return
         self.sign = -1.0 if side == LOWER_SIDE else 1.0
         self._position, self._mass = (float(v) for v in self._constants.get())
-        self._gains = [self._gain(self._transfers, c) for c in self._told]
+        self._gains = [self._gain(self._transfers, c) for c in self._connections]
         self._input_gains = [self._gain(self._inward, c) for _, c in self._feeding]
         self._stiffness = self._damping = 0.0
         self._depth: float | None = None
@@ -145,10 +145,10 @@ class ContactBond:
     def look(self) -> _Answer:
         """Return the contact now: the body's motion, and the stop's last answer."""
         displacement, velocity = (float(v) for v in self._outputs.get())
-        values = iter(self._asked.get())
+        values = iter(self._stop_outputs.get())
         force, stiffness, damping = (
             0.0 if connection is None else gain * float(next(values))
-            for gain, connection in zip(self._gains, self._told, strict=True)
+            for gain, connection in zip(self._gains, self._connections, strict=True)
         )
         return _Answer(self.penetration_at(displacement), self.sign * velocity, force, stiffness, damping)
 
@@ -352,7 +352,7 @@ class ContactBond:
         instance.restore(self._probe_state)
         self._write_inputs(penetration, rate)
         instance.step_undiscarded(time, size)
-        return self._gains[0] * float(self._asked.get()[0])
+        return self._gains[0] * float(self._stop_outputs.get()[0])
 
     def _write_inputs(self, penetration: float, rate: float) -> None:
         """Write this motion of the contact point to the stop."""
@@ -368,7 +368,7 @@ class ContactBond:
 
     def force_of_stop(self) -> float:
         """Return the present force of the stop, N."""
-        return self._gains[0] * float(self._asked.get()[0])
+        return self._gains[0] * float(self._stop_outputs.get()[0])
 
     def penetration_at(self, displacement: float) -> float:
         """Return the penetration of the contact point at this displacement, m."""

@@ -96,16 +96,16 @@ class TrialSteps:
                 free = self.velocity(trial)
                 reached = self.velocity(trial, force)
                 changed = reached - free
-                wanted = TRIAL_CHANGE * max(abs(start), abs(reached))
+                target = TRIAL_CHANGE * max(abs(start), abs(reached))
                 if abs(changed) <= VISIBLE * abs(reached):
                     force *= 1e6
                     if changed == 0.0:
                         trial = min(2.0 * trial, longest)
                     continue
                 mass = force * trial / changed
-                if abs(changed) <= 2.0 * wanted or wanted == 0.0:
+                if abs(changed) <= 2.0 * target or target == 0.0:
                     break
-                force *= wanted / abs(changed)
+                force *= target / abs(changed)
         return mass
 
     def check_mass(self, given: float, time: float, size: float) -> None:

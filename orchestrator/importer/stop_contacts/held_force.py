@@ -47,24 +47,24 @@ FORCE_TOLERANCE = 1e-12
 FORESIGHTS, SHORTENINGS = 12, 12
 MOST_SHORTENED = 3.0
 #: Misfit of a predicted force, relative to the largest, above which its step is far too long.
-LOST = 0.1
+LARGE_MISFIT = 0.1
 #: Length of a step over its limit as known at its end, above which the step is shortened.
 SLACK = 1.5
 #: Exit path, as a fraction of the step limit, below which the body counts as separated.
-LEFT = 1e-9
+EXIT_PART = 1e-9
 #: Part of a step at each of its ends; a turn of the motion there does not divide the step.
 NOT_AT_ONCE = 1e-3
 #: Residual relative to the energy of the contacts, above which a remark reports it.
-UNTOLD = 1e-3
+REPORTED_RESIDUAL = 1e-3
 #: Ratio of the smaller end velocity to the larger, below which a motion that turns counts as ending at its turn.
-SLOW = 0.2
+TURNING_RATIO = 0.2
 #: Shortest step, over (1 + |time|), s.
 ROOM = 1e-13
-#: Change of the velocity by a changing acceleration on the way to an arrival, relative to it. Below SURE the arrival
-#: is predicted surely; above it a step covers the part NEARER of the time to it.
-SURE, NEARER = 1e-9, 0.75
+#: Change of the velocity by a changing acceleration on the way to an arrival, relative to it. Below STEADY_CHANGE
+#: the predicted arrival is certain; above it a step covers the part APPROACH_PART of the time to it.
+STEADY_CHANGE, APPROACH_PART = 1e-9, 0.75
 #: Length of a step over the step before, below which it gives too little information on accelerations.
-TELLING = 0.05
+INFORMATIVE_PART = 0.05
 
 
 class HeldForceBond:
@@ -108,7 +108,7 @@ class HeldForceBond:
         self._is_new = True
         self._work = ContactWork()
         self._other, self._other_slope = 0.0, 0.0
-        self._told: tuple[float, float, float] | None = None
+        self._last_sample: tuple[float, float, float] | None = None
         self._searched = False
         self._checks_mass = self.revisable
         self._agreed = -math.inf
@@ -128,7 +128,7 @@ class HeldForceBond:
         self._misfit = math.inf
         was_closed, self.arrived = self.closed, False
         size = target - time
-        if not self.revisable and self._told is None:
+        if not self.revisable and self._last_sample is None:
             size *= TRIAL_STEP  # the body's acceleration is not known yet
         with self.stop.asking():
             if self.stop.surface is None and not self._searched:
@@ -169,8 +169,8 @@ class HeldForceBond:
             if path.size > SLACK * scale:
                 self._last_try = None
                 return time + self._foresee(max(scale, path.size / MOST_SHORTENED))
-            wanted = self._mean_force(path)
-        return end if self._corrects(wanted) else None
+            required = self._mean_force(path)
+        return end if self._corrects(required) else None
 
     def agree(self, time: float, end: float) -> None:
         """Adjust the force of a body that cannot repeat its step to the end of the step, s."""
@@ -197,7 +197,7 @@ class HeldForceBond:
 
     def remark(self) -> str:
         """Return a remark on the residual; empty where it is small."""
-        if not abs(self.residual) > UNTOLD * self._work.energy:
+        if not abs(self.residual) > REPORTED_RESIDUAL * self._work.energy:
             return ""
         why = "" if self.revisable else f" of {self.contact.body}, which cannot restore its state,"
         return f"{self.name}: the held force{why} has {self._work.share(self.residual)}. Use a shorter macro_step"
@@ -221,11 +221,11 @@ class HeldForceBond:
             contact = self._force / self.mass
         middle = self._time + 0.5 * path.size
         other = (path.end_velocity - path.start_velocity) / path.size + contact
-        if self._told is not None:
-            if path.size < TELLING * self._told[2]:
+        if self._last_sample is not None:
+            if path.size < INFORMATIVE_PART * self._last_sample[2]:
                 return
-            self._other_slope = (other - self._told[1]) / (middle - self._told[0])
-        self._told, self._other = (middle, other, path.size), other
+            self._other_slope = (other - self._last_sample[1]) / (middle - self._last_sample[0])
+        self._last_sample, self._other = (middle, other, path.size), other
 
     # ---- touching, arriving ----
 
@@ -303,8 +303,8 @@ class HeldForceBond:
         arrival = 2.0 * gap / (velocity + math.sqrt(square))
         if arrival >= size:
             return size
-        blurred = abs(self._other_slope) * arrival**2 > SURE * abs(velocity)
-        return max(self._room, NEARER * arrival if blurred else arrival)
+        blurred = abs(self._other_slope) * arrival**2 > STEADY_CHANGE * abs(velocity)
+        return max(self._room, APPROACH_PART * arrival if blurred else arrival)
 
     # ---- the beginning of a contact ----
 
@@ -353,9 +353,9 @@ class HeldForceBond:
 
     def _other_after(self, size: float) -> float:
         """Return the body's mean acceleration into the stop in the next `size` s by all but this contact, m/s^2."""
-        if self._told is None:
+        if self._last_sample is None:
             return 0.0
-        return self._other + self._other_slope * (self._time + 0.5 * size - self._told[0])
+        return self._other + self._other_slope * (self._time + 0.5 * size - self._last_sample[0])
 
     def _foreseen_path(self, size: float, force: float) -> StepPath:
         assert self.mass is not None
@@ -401,7 +401,7 @@ class HeldForceBond:
             self._force = self._foreseen_force(size)
             path = self._foreseen_path(size, self._force)
             scale = self._time_scale(path)
-            if size > SLACK * scale or self._misfit > LOST * self._largest:
+            if size > SLACK * scale or self._misfit > LARGE_MISFIT * self._largest:
                 size = max(
                     min(scale, size / SLACK), size / MOST_SHORTENED
                 )  # a step that is far too long gives little information on the right size
@@ -412,7 +412,7 @@ class HeldForceBond:
                 continue
             if leaves is None:
                 break
-            if leaves * size <= LEFT * min(whole, self._limit) + self._room:
+            if leaves * size <= EXIT_PART * min(whole, self._limit) + self._room:
                 self.closed, self._force = False, 0.0
                 return whole
             size *= leaves
@@ -434,7 +434,7 @@ class HeldForceBond:
         """Return the force that does the work of the stop's law over a step, N."""
         moved = path.end - path.start
         slow, fast = sorted((path.start_velocity, path.end_velocity), key=abs)
-        if moved != 0.0 and (slow * fast >= 0.0 or abs(slow) <= SLOW * abs(fast)):
+        if moved != 0.0 and (slow * fast >= 0.0 or abs(slow) <= TURNING_RATIO * abs(fast)):
             return max(0.0, self.stop.work(path) / moved)
         mean = 0.0
         for u, weight in NODES:
@@ -444,14 +444,14 @@ class HeldForceBond:
             mean += weight * (elastic + whole - self.stop.force(displacement, 0.0, u * path.size))
         return max(0.0, mean)
 
-    def _corrects(self, wanted: float) -> bool:
+    def _corrects(self, required: float) -> bool:
         """Take the force that the end of a step requires, N; returns whether it is a new force."""
         force = self._force
-        self._largest = max(self._largest, wanted)
-        if abs(wanted - force) <= FORCE_TOLERANCE * self._largest:
+        self._largest = max(self._largest, required)
+        if abs(required - force) <= FORCE_TOLERANCE * self._largest:
             return False
-        self._force = _secant(force, wanted, self._last_try)
-        self._last_try = force, wanted
+        self._force = _secant(force, required, self._last_try)
+        self._last_try = force, required
         return self._force != force
 
     def free(self) -> None:

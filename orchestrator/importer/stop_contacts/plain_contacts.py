@@ -19,7 +19,7 @@ FORCE, ANSWER, DISPLACEMENT, VELOCITY = "applied_force", "applied_restitution", 
 #: Relative energy gain of a lossless contact by a plain connection, times its number of steps (docs/coupling.md).
 GAIN = 5.0
 #: Residual relative to the energy of the contacts, above which a remark reports it.
-UNTOLD = 1e-6
+REPORTED_RESIDUAL = 1e-6
 
 
 def plain_contact(
@@ -33,14 +33,14 @@ def plain_contact(
     port = target.rpartition(".")[0]
     if output != FORCE or ANSWER not in variables[stop] or f"{port}.law" in variables[body]:
         return None
-    told = {c.target[1]: c for c in connections if c.target[0] == stop and c.source[0] == body}
-    if DISPLACEMENT not in told or any(connection.gain != 1.0 for connection in told.values()):
+    by_variable = {c.target[1]: c for c in connections if c.target[0] == stop and c.source[0] == body}
+    if DISPLACEMENT not in by_variable or any(connection.gain != 1.0 for connection in by_variable.values()):
         return None
-    velocity = told.get(VELOCITY)
+    velocity = by_variable.get(VELOCITY)
     return StopContactSpec(
         body,
-        told[DISPLACEMENT].source[1],
-        told[DISPLACEMENT].source[1] if velocity is None else velocity.source[1],
+        by_variable[DISPLACEMENT].source[1],
+        by_variable[DISPLACEMENT].source[1] if velocity is None else velocity.source[1],
         target,
         stop,
         stop_velocity=None if velocity is None else VELOCITY,
@@ -67,17 +67,17 @@ class PlainContact:
     def begin(self, gain: float) -> None:
         """Start a run with this gain."""
         self._gain = gain
-        self._begun = False
+        self._has_started = False
         self._work = ContactWork()
         self.residual = 0.0
 
     def before(self, time: float) -> None:
         """Note the start of a step."""
-        if not self._begun:
+        if not self._has_started:
             self._yields = not self._stop.is_rigid
             if self._yields:
                 self._stop.begin()
-            self._begun = True
+            self._has_started = True
         if self._yields:
             self._start = self._look()
             self._stop.mark(time)
@@ -99,7 +99,7 @@ class PlainContact:
 
     def remark(self) -> str:
         """Return a remark on the residual; empty where it is small."""
-        if not abs(self.residual) > UNTOLD * self._work.energy:
+        if not abs(self.residual) > REPORTED_RESIDUAL * self._work.energy:
             return ""
         steps = self._work.steps / max(1, self._work.contacts)
         return (

@@ -115,21 +115,21 @@ class Pulse:
 
     def _force(self, time: float, size: float) -> float:
         """Return the force, N, that changes the velocity by the impulse over the mass."""
-        force, wanted = self.owed / size, self.owed / self.mass
+        force, needed = self.owed / size, self.owed / self.mass
         with self._trials.untraced(time):
             free, least, best = self._trials.velocity(size), math.inf, force
             for _ in range(CORRECTIONS):
-                missed = wanted - (self._trials.velocity(size, force) - free)
-                if abs(missed) <= MISFIT * (abs(free) + abs(wanted)):
+                missed = needed - (self._trials.velocity(size, force) - free)
+                if abs(missed) <= MISFIT * (abs(free) + abs(needed)):
                     return force
                 if abs(missed) < least:
                     least, best = abs(missed), force
                 force += missed * self.mass / size
-        if least <= ROUNDED * MISFIT * abs(wanted):
+        if least <= ROUNDED * MISFIT * abs(needed):
             return best
         raise ComponentError(
-            f"{self._name}: expected a change of the velocity by {wanted:.6g} m/s, which is an impulse of "
-            f"{self.owed:.6g} N s, got one by {wanted - missed:.6g} m/s after {CORRECTIONS} tries at time {time:.12g}. "
+            f"{self._name}: expected a change of the velocity by {needed:.6g} m/s, which is an impulse of "
+            f"{self.owed:.6g} N s, got one by {needed - missed:.6g} m/s after {CORRECTIONS} tries at time {time:.12g}. "
             "Use a law that yields: kelvin_voigt, hertz or hunt_crossley.",
             instance=self._trials.body.name,
             time=time,

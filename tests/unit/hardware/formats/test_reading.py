@@ -25,7 +25,7 @@ from vibroimpact.hardware.formats.reading import read_file
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 from vibroimpact.hardware.recordings import import_recording
 
-FIELDS = ("label", "unit", "interval", "start", "group", "rails", "attrs", "dated", "doubt")
+FIELDS = ("label", "unit", "interval", "start", "group", "rails", "attrs", "dated", "ambiguity")
 
 
 @pytest.fixture(scope="module")
