@@ -68,8 +68,7 @@ def impacts_of(options: EstimateImpacts, spelling: Spelling = typed) -> None:
             else estimate_impacts(part, forcing, known)
         )
         print_impacts(console, found)
-    dataset = found.dataset().assign_attrs(estimates="impacts")
-    _write(console, _sourced(dataset, options.data, recording), options)
+    _write(console, _sourced(found.dataset(), options.data, recording), options)
 
 
 def bounces_of(options: EstimateBounces, spelling: Spelling = typed) -> None:

@@ -244,11 +244,6 @@ class OrbitEnergies:
         """Residual energy of all modes minus the loss at the impacts (thesis 6.32), over the energy before impacts."""
         return float(abs(self.residual.sum() - self.lost.sum()) / self.kinetic.sum())
 
-    @property
-    def modal_error(self) -> float:
-        """Largest sum of residual energy and changes at impacts of one mode, over the energy before impacts."""
-        return float(np.abs(self.residual + self.change.sum(axis=0)).max() / self.kinetic.sum())
-
 
 def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     """Return the energies of the modes over an orbit.

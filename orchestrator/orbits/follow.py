@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Self
 
@@ -12,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits.branches import multiplier_text
-from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, FollowSettings, SpecialPoint
+from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, FollowSettings, SpecialPoint
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted, typed
@@ -163,7 +164,8 @@ class Following(Study[str]):
             low, high = float(branch.values.min()), float(branch.values.max())
             say(
                 f"{number}  {branch.full_name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
-                f"{stable} stable; begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
+                f"{stable} stable{_stable_ranges(branch)}; "
+                f"begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
             )
 
     def _print_unexplained(self) -> None:
@@ -192,6 +194,13 @@ class Following(Study[str]):
                 say(
                     f"   codimension 2, {locus.kind} and {kind}: {point.values[0]:.11g}, {point.values[1]:.11g}"
                 )
+
+
+def _stable_ranges(branch: Branch) -> str:
+    """Return the ranges of the followed number with stable orbits, in parentheses; no range: an empty text."""
+    groups = groupby(branch.orbits, key=lambda each: each.orbit.is_stable)
+    ranges = [sorted(each.value for each in orbits) for is_stable, orbits in groups if is_stable]
+    return f" ({', '.join(f'{each[0]:.6g} to {each[-1]:.6g}' for each in ranges)})" if ranges else ""
 
 
 def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:

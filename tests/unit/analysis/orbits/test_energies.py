@@ -57,7 +57,8 @@ def test_the_chain_of_the_thesis_exchanges_what_equations_9_says() -> None:
     np.testing.assert_allclose(found.before, [[0.36859999, 0.0078044]], atol=5e-9)
     np.testing.assert_allclose(found.after, [[0.04399588, 0.17420406]], atol=5e-9)
     assert found.identity_error < CLOSED
-    assert found.modal_error < CLOSED
+    # of each mode, what stays in it is what impacts change
+    assert np.abs(found.residual + found.change.sum(axis=0)).max() < CLOSED * found.kinetic.sum()
     assert found.restitution.value == pytest.approx(0.7, abs=1e-14)
 
 
