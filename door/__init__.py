@@ -1,6 +1,6 @@
-"""Dynamics of things that vibrate and hit stops: scenes, runs and campaigns of them, recordings, estimates, figures.
+"""Dynamics of vibrating bodies that hit stops: scenes, runs, campaigns, recordings, estimates and figures.
 
-Everything a command does, in a few lines; names are loaded when they are first used.
+Everything that the commands do takes a few lines of Python here. A name is loaded when it is first used.
 
 Examples
 --------
@@ -22,7 +22,7 @@ Examples
 from __future__ import annotations
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is below, a test compares them
+if TYPE_CHECKING:  # names for type checkers and editors; a test compares them with `_NAMES`
     from vibroimpact import fmus as fmus
     from vibroimpact.analysis import figures as figures
     from vibroimpact.analysis.dataset import open_dataset as open_dataset
@@ -137,7 +137,7 @@ _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}
 __all__ = [*_HOMES, *_ROOMS, "__version__"]
 
 
-if not TYPE_CHECKING:  # else every name would be one
+if not TYPE_CHECKING:  # a type checker that saw `__getattr__` would accept any name
 
     def __getattr__(name: str) -> object:
         import importlib

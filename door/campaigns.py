@@ -1,4 +1,4 @@
-"""Sweeps of a scene on many workers: a dataset comes back, the campaign stays in its folder."""
+"""Campaigns: sweeps of a scene on many workers, kept in a folder and returned as a dataset."""
 
 from __future__ import annotations
 
@@ -28,36 +28,37 @@ def campaign(
     scheduler: str | Client | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
-    """Compute all points of a scene's sweep with many workers; the same call resumes after anything.
+    """Compute all points of a scene's sweep with many workers; the same call resumes an interrupted campaign.
 
     Parameters
     ----------
     scene : Scene, path or mapping
+        A scene with a sweep, the file of a scene or of a system (SSP), or the tables of a scene.
     folder : path
-        One campaign, one folder; made when absent. The dataset is `dataset.nc` in it.
+        Folder of this campaign alone; it is made when absent. The dataset is its file `dataset.nc`.
     workers : int, optional
-        Worker processes on this machine. By default the campaign begins in this process, and one for each processor
-        goes on with it where more than 2 s are left.
+        Number of worker processes on this machine. By default the campaign begins in this process. One worker for
+        each processor takes over where more than 2 s of work are left.
     scheduler : str or dask.distributed.Client, optional
-        Workers to use instead: the address of a Dask scheduler, or a client of it.
+        Dask scheduler whose workers to use instead: its address, or a client of it.
     progress : bool
-        Show how far it is.
+        Whether to show the progress.
 
     Returns
     -------
     xarray.Dataset
-        As `open_dataset(folder)` gives it.
+        The dataset as `open_dataset(folder)` returns it.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
     UsageError
         The folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
     CampaignError
         The campaign could not finish; the same call resumes it.
     CampaignInterrupted
-        On Ctrl-C, a KeyboardInterrupt; the same call resumes.
+        Ctrl-C was pressed (a KeyboardInterrupt); the same call resumes the campaign.
 
     Examples
     --------

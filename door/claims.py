@@ -1,4 +1,4 @@
-"""Hard cases of impacts, and how well each claim about them holds on this machine."""
+"""Hard cases of impacts: the error of each claim about them, measured on this machine."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from vibroimpact.returned import of_study
 
 
 def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> xr.Dataset:
-    """Run what breaks solvers of impacts, and measure how well each claim about it holds on this machine.
+    """Run the cases that break solvers of impacts, and measure how well each claim holds on this machine.
 
     Parameters
     ----------
     only : str or sequence of str
-        Names of the cases to run; none: all of docs/hard_cases.md that have one.
+        Names of the cases to run. By default all named cases of docs/hard_cases.md run.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
 
     Returns
     -------
     xarray.Dataset
-        `figure`, `bound` and `is_met` of each `case`, what is drawn of it (`x`, `y`), and its `name`, `claim` and
-        `reference` in words; `attrs["missed"]` names those whose bound is missed.
+        Each `case` has a measured `figure`, its `bound` and `is_met`. `name`, `claim` and `reference` describe the case
+        in words; `x` and `y` are its drawn curve. `attrs["missed"]` names the cases whose bound is missed.
 
     Raises
     ------
     UsageError
-        There is no such case, or one is named twice, or the dataset cannot be written there.
+        A case is unknown or named twice, or the dataset cannot be written.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""FMUs and systems (SSP) of scenes, for other tools, and scenes of theirs: thin over the functions of the commands."""
+"""Exchange with other tools: scenes written as FMUs or systems (SSP), and systems read as scenes."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ def export_fmu(
     enumerations: bool = False,
     platform: str | None = None,
 ) -> Path:
-    """Write an FMU of a scene's body, stops and forcing, for another tool; components alone: `vi.fmus.export`.
+    """Write a scene's body, stops and forcing as one FMU for another tool; `vi.fmus.export` writes one component.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        Of one body. What it sweeps has the value that it has in its own table.
+        A scene of one body. A swept key has the value in its own table, not the values of the sweep.
     path : path
-        The file to write.
+        FMU file to write.
     fmi, full, external, enumerations, platform
-        As `vibroimpact.fmus.export` has them.
+        Options of the FMU: see `vibroimpact.fmus.export`.
 
     Returns
     -------
     Path
-        The file.
+        The written file.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
     UsageError
         The scene has another kind of body, or the file cannot be written.
     ComponentError
-        There is no library for a platform, and nothing to compile it with.
+        A platform has no library, and no compiler was found to build it.
 
     Examples
     --------
@@ -80,36 +80,36 @@ def export_ssp(
     gains: str = "component",
     platform: str | None = None,
 ) -> Path:
-    """Write a scene of components as a system (SSP) that other tools run; `import_ssp` gives it back.
+    """Write a scene of components as a system (SSP) that other tools run; `import_ssp` reads the system back.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        With components.
+        A scene with components.
     path : path
-        The file to write.
+        Archive to write.
     ssp : str
-        `1.0` or `2.0`.
+        Version of SSP, `1.0` or `2.0`.
     fmi : str, optional
-        Version of FMI of this package's components in the archive; by default 2.0, in SSP 2.0 that of the scene.
+        FMI version of this package's components in the archive. The default is 2.0; in SSP 2.0, the scene's version.
     gains : str
-        How a connection has its gain: as a `component` with units of its own, or as a `transformation`.
+        Form of a connection's gain: a `component` with units of its own, or a `transformation`.
     platform : str, optional
-        As `vibroimpact.fmus.export` has it.
+        Platform of the libraries: see `vibroimpact.fmus.export`.
 
     Returns
     -------
     Path
-        The file.
+        The written file.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
     UsageError
         The scene has no components, or the file cannot be written.
     ComponentError
-        There is no library for a platform, and nothing to compile it with.
+        A platform has no library, and no compiler was found to build it.
 
     Examples
     --------
@@ -123,28 +123,29 @@ def export_ssp(
 def import_ssp(
     path: PathLike, output: PathLike | None = None, *, parameters: PathLike | Sequence[PathLike] = ()
 ) -> Scene:
-    """Read a system (SSP 1.0 or 2.0) as a scene; `run`, `campaign` and `cost_of` take its path as it is.
+    """Read a system (SSP 1.0 or 2.0) as a scene; `run`, `campaign` and `cost_of` also take the path of a system.
 
-    What the system leaves open, and parameters that nothing has, are said on standard error.
+    Notes on standard error list settings that the system leaves open, and parameters that match no component.
 
     Parameters
     ----------
     path : path
-        The archive.
+        Archive of the system.
     output : path, optional
-        The scene file to write as well (.toml), with the FMUs in a folder beside it; files that are there and hold
-        something else are refused. Without one the FMUs lie unpacked until this process ends.
+        Scene file to write as well (.toml), with the FMUs in a folder next to it. Existing files with other contents
+        are refused. Without `output`, the FMUs stay unpacked until this process ends.
     parameters : path or sequence of path
-        Parameter sets (.ssv), files or ones in the archive: one is applied, several become a sweep.
+        Parameter sets (.ssv), as files or by their name in the archive. One set is applied, several become a sweep.
 
     Returns
     -------
     Scene
+        The scene of the system.
 
     Raises
     ------
     SceneError
-        What is wrong with the system, or with the scene that it makes.
+        The system, or the scene made from it, is wrong.
     ComponentFileError
         The archive, or an FMU in it, is unsafe or damaged.
     UsageError

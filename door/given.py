@@ -1,4 +1,4 @@
-"""What callers give: a scene in any of its forms, names of files."""
+"""Arguments of callers: a scene in any of its forms, names of files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PathLike = str | os.PathLike[str]
 
 
 def given_scene(given: SceneLike, *, for_orbits: bool = False) -> Scene:
-    """Return the scene that a caller means, else UsageError; for orbits an unwritten start may be on a stop."""
+    """Return the scene of a caller's argument, or raise UsageError; for orbits a default start may be on a stop."""
     if isinstance(given, Scene):
         return given
     if isinstance(given, Mapping):
@@ -38,9 +38,9 @@ def given_scene(given: SceneLike, *, for_orbits: bool = False) -> Scene:
 
 
 def prepared_scene(given: SceneLike) -> Scene:
-    """Return the scene that a caller means, ready to run: see `study.preparation.prepared_scene`.
+    """Return the scene of a caller's argument, ready to run: see `study.preparation.prepared_scene`.
 
-    Studies take longer to load than most scenes to run, and a scene without a tolerance needs none.
+    The studies are loaded only for a scene with a tolerance: loading them takes longer than most scenes run.
     """
     scene = given_scene(given)
     if scene.execution.tolerance is None:
@@ -51,7 +51,7 @@ def prepared_scene(given: SceneLike) -> Scene:
 
 
 def scene_with_modes(given: SceneLike) -> Scene:
-    """Return the scene that a caller means, its number of modes found: see `study.preparation.with_found_modes`."""
+    """Return a caller's scene with its number of modes determined: see `study.preparation.with_found_modes`."""
     scene = given_scene(given)
     if scene.execution.tolerance is None:
         return scene
@@ -61,17 +61,17 @@ def scene_with_modes(given: SceneLike) -> Scene:
 
 
 def given_path(given: object) -> Path:
-    """Return the file or folder that a caller names; raise UsageError for anything else."""
+    """Return the path of a file or folder that a caller names; raise UsageError for anything else."""
     if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
         raise UsageError(f"path: expected the name of a file or folder, got {given!r}.")
     return Path(given)
 
 
 def given_output(given: object, read: Iterable[object]) -> Path:
-    """Return the file that a caller wants to be written; it is looked at before anything runs.
+    """Return the output path of a caller, checked before anything runs.
 
-    Files among what else the caller gives (`read`), and those of scenes, are not written over: UsageError, as for no
-    name, or where nothing can be written.
+    Raise UsageError for anything but a name, for a place that cannot be written, and for a file that the call reads.
+    These files are the paths in `read`, and the files of its scenes.
     """
     path = given_path(given)
     files: list[Path] = []
@@ -85,12 +85,12 @@ def given_output(given: object, read: Iterable[object]) -> Path:
 
 
 def given_result(given: PathLike | None, read: Iterable[object]) -> Path | None:
-    """Return the dataset that a caller wants to be written as well, if any: see `given_output`."""
+    """Return the path of the dataset to write as well, None without one: see `given_output`."""
     return None if given is None else given_output(given, read)
 
 
 def given_paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
-    """Return the files that a caller names, one or several, as `given_path` does."""
+    """Return the paths of one or several files that a caller names: see `given_path`."""
     if isinstance(given, str | os.PathLike) or not isinstance(given, Iterable):
         return [given_path(given)]
     return [given_path(one) for one in given]

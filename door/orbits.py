@@ -1,4 +1,4 @@
-"""Orbits, branches, maps, basins and control: thin over the functions that the commands stand on."""
+"""Orbits, branches, maps, basins and control: a thin layer over the functions behind the commands."""
 
 from __future__ import annotations
 
@@ -29,31 +29,32 @@ def find_orbits(
     seed: Sequence[tuple[float, int]] | None = None,
     penetrating: bool = False,
 ) -> FoundOrbits:
-    """Find periodic orbits of a scene, stable and unstable ones.
+    """Find stable and unstable periodic orbits of a scene.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; the sweep is ignored.
     impacts, periods : int, optional
-        p and q of P(p,q). Without them, all orbits P(1,1), and the orbit that a long run ends on.
+        p and q of P(p,q). By default all orbits P(1,1) are found, and the orbit that a long run ends on.
     seed : sequence of (phase, stop), optional
-        Forcing phases, rad, of impacts near to those of one orbit, and their stops, from 1: that orbit alone.
+        Approximate impacts of one orbit: their forcing phases (rad) and the numbers of their stops, from 1. Only this
+        orbit is returned.
     penetrating : bool
         Whether orbits that pass through a stop between impacts are returned as well.
 
     Returns
     -------
     list of PeriodicOrbit
-        With `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable`, `highest` maximum between impacts. `draw`
-        draws the list, and its `dataset` has each physical orbit as a run.
+        Each has `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable` and its `highest` maximum between
+        impacts. `draw` draws the list. The list's `dataset` has each physical orbit as a run.
 
     Raises
     ------
     UsageError
-        Orbits of the scene are not followed.
+        The scene has another kind of body, stop or force.
     OrbitError
-        There is no orbit near to the seed.
+        There is no orbit near the seed.
 
     Examples
     --------
@@ -85,45 +86,45 @@ def follow(
     second: str | None = None,
     second_range: tuple[float, float] | None = None,
 ) -> xr.Dataset:
-    """Follow periodic orbits of a scene over one of its numbers, through folds and period doublings.
+    """Follow periodic orbits of a scene over a parameter, through folds and period doublings.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; the sweep is ignored.
     parameter : str
-        Key of a number, such as `forcing.angular_frequency`.
+        Key of a number in the scene, for example `forcing.angular_frequency`.
     start, stop : float
-        Its range.
+        Ends of the parameter's range.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
     impacts, periods : int, optional
-        p and q of the orbits to begin with, which are looked for along the range; P(1,1).
+        p and q of the orbits that the branches start from; they are searched along the range. The default is P(1,1).
     seed : sequence of (phase, stop), optional
-        Forcing phases, rad, of impacts near to those of one orbit of the scene as it is, and their stops, from 1: that
-        orbit is followed both ways.
+        Approximate impacts of one orbit at the scene's own parameter: their forcing phases (rad) and the numbers of
+        their stops, from 1. This orbit is followed in both directions.
     doublings : int
-        How often branches of twice the period are followed on.
+        Number of successive period doublings whose branches are followed.
     step : float
-        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
+        Largest step along a branch. The parameter is scaled to a range of 1, the phases are in radians.
     second : str, optional
-        Another number: folds, period doublings and grazes are followed over both.
+        Key of a second parameter. Folds, period doublings and grazes are followed over both parameters.
     second_range : tuple of float, optional
-        Its range.
+        Ends of the second parameter's range.
 
     Returns
     -------
     xarray.Dataset
-        Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
-        `second`, each is an orbit at a bifurcation, where there are any. The attributes `curves` and `not_looked_for`
-        say on which branch each curve was found, and what was not looked for.
+        Each run is an orbit, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier. With
+        `second`, each run is an orbit at a bifurcation, if any was found. The attribute `curves` names the branch of
+        each bifurcation curve; `not_looked_for` lists bifurcations that were not searched.
 
     Raises
     ------
     UsageError
-        Orbits of the scene are not followed, or a parameter is no number of it.
+        The scene has another kind of body, stop or force, or a parameter is no number of the scene.
     OrbitError
-        There is no orbit to begin with.
+        There is no orbit to start from.
 
     Examples
     --------
@@ -145,31 +146,32 @@ def follow(
 
 
 def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:
-    """Return a map of a scene as points to be drawn.
+    """Return a Poincaré map of a scene, or a bifurcation diagram of a normal form, as points to draw.
 
     Parameters
     ----------
     scene : Scene, path or mapping, optional
-        A body on restitution stops under a harmonic force; `square-root`, and `nordmark` with alpha and gamma, need
-        none.
+        A body on restitution stops under a harmonic force. `square-root`, and `nordmark` with alpha and gamma, need
+        no scene.
     kind : {"impact", "strobe", "discontinuity", "nordmark", "square-root"}
-        Phase and velocity of the impacts of a long run, with the orbits P(1,1); states at forcing phase 0, likewise;
-        the sets S and W of impacts before and after a graze, of one mode (thesis figure 2.12); bifurcation diagrams of
-        Nordmark's map (2.18) and of the one-dimensional square-root map (2.19).
+        `impact`: phase and velocity of the impacts of a long run, with the orbits P(1,1). `strobe`: states at forcing
+        phase 0, with the same orbits. `discontinuity`: sets S and W of impacts before and after a graze, one mode
+        (thesis figure 2.12). `nordmark`, `square-root`: bifurcation diagrams of Nordmark's map (2.18) and of the
+        one-dimensional square-root map (2.19).
     **options
-        `span`, `points`, `alpha`, `gamma`, `restitution`, `slope`: of the last two kinds, see `MapSettings`.
+        Options of the last two kinds: `span`, `points`, `alpha`, `gamma`, `restitution`, `slope`; see `MapSettings`.
 
     Returns
     -------
     xarray.Dataset
-        What `draw` draws.
+        The points, which `draw` draws.
 
     Raises
     ------
     UsageError
-        There is no such map, or the scene has none.
+        The map is unknown, or the scene does not have it.
     OrbitError
-        The body has several modes, where the map is one of one mode.
+        The body has several modes, and the map is defined for one.
     """
     settings = settings_of(kind, **options)
     return of_study(MapOfScene(None if scene is None else given_scene(scene), settings))
@@ -183,32 +185,32 @@ def basins(
     *,
     number: int | None = None,
 ) -> xr.Dataset:
-    """Find which attractor each start of a plane ends on.
+    """Find the attractor that each start in a plane of initial states ends on.
 
     Parameters
     ----------
     scene : Scene, path or mapping
         An oscillator, a chain or a beam on restitution stops under a harmonic force.
     x, y : tuple of float, optional
-        Ends of displacement (m) and velocity (m/s) at the start; those of the scene's own motion, twice as far.
+        Ranges of the initial displacement (m) and velocity (m/s). The default is twice the range of the scene's motion.
     points : tuple of int
-        Along both.
+        Numbers of starts along x and y.
     number : int, optional
-        Which mass of a chain, or mode of a beam, starts so: the mass that is hit first, mode 1; the others start as the
-        scene says.
+        Number of the mass of a chain, or of the mode of a beam, whose start is varied. The others keep the scene's
+        start. The default is the mass that hits first, or mode 1.
 
     Returns
     -------
     xarray.Dataset
-        `basin` on (velocity_start, displacement_start): numbers along `attractor`, -1 undecided, -2 beyond a stop; of
-        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, its states at forcing phase 0, and
-        `attractor_impacts` in a forcing period at each stop. The attribute `undetected_share_below` is the share of
-        starts that may end on an attractor which the sample of chaotic starts missed (95 % confidence).
+        `basin` has the dims (velocity_start, displacement_start): a number along `attractor`, -1 undecided, -2 beyond a
+        stop. Each attractor has a name (`P(1,1)`, `chaos`, ...), its `basin_fraction`, its states at forcing phase 0,
+        and `attractor_impacts`, impacts per forcing period at each stop. The attribute `undetected_share_below` bounds
+        the share of starts on attractors that the sample of chaotic starts missed (95 % confidence).
 
     Raises
     ------
     UsageError
-        The scene has no such orbits, or the plane no starts.
+        The scene has another kind of body, stop or force, or the plane has no starts.
     """
     return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number)))
 
@@ -227,7 +229,7 @@ def control(
     periods: int = 1,
     stay: int = 1,
 ) -> xr.Dataset:
-    """Keep an orbit P(1,q) from one angular frequency to another by the forcing amplitude.
+    """Keep an orbit P(1,q) from one angular frequency to another by corrections of the forcing amplitude.
 
     Parameters
     ----------
@@ -236,36 +238,37 @@ def control(
     start, stop : float
         Angular frequencies, rad/s.
     law : {"ogy", "deadbeat", "newton"}
-        What is done about a deviation at an impact: the next one is put on the direction that comes back faster; the
-        orbit is reached two impacts later; as the first, about an orbit that is located from the last two impacts.
+        Correction of a deviation at an impact. `ogy` puts the next impact on the direction that returns faster.
+        `deadbeat` reaches the orbit two impacts later. `newton` is `ogy` about an orbit located from the last two
+        impacts.
     step : float
-        Of the angular frequency, rad/s.
+        Step of the angular frequency, rad/s.
     tolerance : float
-        Difference of two speeds in a row, over that of the orbit, at which the frequency goes on.
+        Difference of two successive impact speeds, over the orbit's speed, below which the frequency takes its step.
     limit : float
-        Largest correction over the forcing amplitude; 0: nothing is corrected.
+        Largest correction over the forcing amplitude; 0 switches the corrections off.
     noise : float
         Standard deviation of the error of measured speeds, relative.
     seed : int
-        Of the noise.
+        Seed of the noise.
     periods : int
-        q.
+        q of P(1,q), forcing periods between impacts.
     stay : int
-        Flights at each angular frequency at least.
+        Least number of flights at each angular frequency.
 
     Returns
     -------
     xarray.Dataset
-        Along `impact` what came (`impact_velocity`, `correction`, ...), along `orbit` what was to be kept; attributes
-        `kept_to` (rad/s) and `end` say how far it was kept and why not further, `branch_ends_at` where there is no
-        such orbit any more.
+        The impacts along `impact` (`impact_velocity`, `correction`, ...), and the orbits to keep along `orbit`.
+        The attribute `kept_to` is the last frequency (rad/s) at which the orbit was kept, `end` the reason for the end
+        in words. `branch_ends_at` is the frequency at which the orbit ceases to exist.
 
     Raises
     ------
     UsageError
-        The scene has no orbits that this keeps.
+        The scene has no orbits that this feedback keeps.
     OrbitError
-        There is none at the start.
+        The start frequency has no such orbit.
     ComponentError
         pythonfmu is not installed.
     """
@@ -282,35 +285,35 @@ def transients(
     tolerance: float = 1e-6,
     periods: int = 3000,
 ) -> xr.Dataset:
-    """Find how many periods a scene needs to forget its start.
+    """Measure the number of periods after which a scene has forgotten its start.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops; its sweep is left out. Without a harmonic force the
-        period is that of its first mode.
+        An oscillator, a chain or a beam on restitution stops; the sweep is ignored. Without a harmonic force the
+        period is the period of the first mode.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
     starts : int
-        Starts beside that of the scene, drawn evenly, the same each time.
+        Number of other starts, drawn evenly around the scene's start; each call draws the same starts.
     spread : float
-        Their largest distance in each displacement and velocity, over the size of the scene's motion.
+        Largest distance of these starts in each displacement and velocity, over the size of the scene's motion.
     tolerance : float
-        Distance over that size below which a start is forgotten.
+        Distance, over the size of the scene's motion, below which a start counts as forgotten.
     periods : int
-        Most periods that are followed.
+        Largest number of periods to follow.
 
     Returns
     -------
     xarray.Dataset
-        `distance` of each `start` from the scene's own motion after each `period`; `forgotten_after` (infinite where it
-        never stays below the tolerance), `contraction` a period, `motion` and `end`: what became of it. The attribute
-        `linear_contraction` is the factor of the body without impacts.
+        `distance` of each `start` from the scene's own motion after each `period`. Each start has `forgotten_after` in
+        periods, infinite if the distance never stays below the tolerance. It also has its `contraction` per period, and
+        its `motion` and `end` in words. The attribute `linear_contraction` is the factor of the body without impacts.
 
     Raises
     ------
     UsageError
-        The scene is none whose orbits are followed, or a number makes no sense.
+        The scene has another kind of body or stop, or a number is out of its range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Recordings that drive a scene, and numbers of the scene that are fitted to them."""
+"""Replays: recordings drive a scene, and numbers of the scene are fitted to them."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ def replay(
     score: PathLike | Sequence[PathLike] = (),
     execution: str | None = None,
 ) -> xr.Dataset:
-    """Drive a scene by recordings, compare its motion with what was measured, fit numbers of it.
+    """Drive a scene by recordings, compare its motion with the measurement, and fit numbers of the scene.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        With `[replay]`.
+        A scene with a table `[replay]`.
     recordings : path or sequence of path
-        Those to replay, and to fit to; none: those that the scene names.
+        Recordings to replay and to fit to. By default the scene names them.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
     fit : str or sequence of str
-        Numbers of the scene to find, by key: `body.damping_ratio`.
+        Keys of the scene's numbers to fit, for example `body.damping_ratio`.
     score : path or sequence of path
-        Recordings to score that were not fitted on.
+        Recordings for validation: they are scored, but not fitted.
     execution : str, optional
-        `auto`, `fused` or `coupled`; None: as the scene says.
+        `auto`, `fused` or `coupled`. The default is the scene's own setting.
 
     Returns
     -------
     xarray.Dataset
-        Signals, scores, fitted numbers; `attrs["verdict"]` says in words how far the model is to be trusted. A
-        campaign over recordings and a grid of numbers: `campaign(scene, folder)`.
+        Signals, scores and fitted numbers. `attrs["verdict"]` says in words how far to trust the model.
+        `campaign(scene, folder)` covers many recordings and a grid of numbers.
 
     Raises
     ------
     SceneError, UsageError, DatasetError, EstimationError
-        What is wrong with the scene, the request, a recording or the fit.
+        The scene, the request, a recording or the fit is wrong.
 
     Examples
     --------

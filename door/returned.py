@@ -1,4 +1,4 @@
-"""Datasets that callers get of files that are written first."""
+"""Datasets of studies, as callers get them; a file is written first where a path is given."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.study import Study, whole
 
 ONE_AT_A_TIME = threading.Lock()
-"""Held while datasets are written and read back: NetCDF's library is not for several threads at once."""
+"""Lock for writing datasets and reading them back: the NetCDF library is not safe for several threads."""
 
 
 def of_study(study: Study[Any], written: Path | None = None) -> xr.Dataset:
-    """Return the results of a study when all of its rows are found, and write them where a path is given."""
+    """Return the results of a study after all of its rows, and write them where a path is given."""
     found = whole(study).dataset
     if written is not None:
         write_results(found, written)
@@ -25,7 +25,7 @@ def of_study(study: Study[Any], written: Path | None = None) -> xr.Dataset:
 
 
 def runs_of_study(study: Study[Any], written: Path | None) -> xr.Dataset:
-    """Return the runs that a study found as `open_dataset` gives them; they are written first where a path is given."""
+    """Return the runs of a study as `open_dataset` returns them; write them first where a path is given."""
     whole(study)
     if written is None:
         found: xr.Dataset = study.drawn

@@ -1,4 +1,4 @@
-"""Scenes that run in this process, point by point: a dataset comes back."""
+"""Runs of a scene in this process, point by point, returned as a dataset."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     Parameters
     ----------
     scene : Scene, path or mapping
-        A scene, the file of one or of a system (SSP), or its tables.
+        A scene, the file of a scene or of a system (SSP), or the tables of a scene.
     path : path, optional
-        The dataset to write as well, whole or not at all; one that is there is replaced.
+        Dataset file to write as well (.nc). It is written whole or not at all; an existing file is replaced.
     progress : bool
-        Show how far it is, where there is more than one point.
+        Whether to show the progress, where the scene has more than one point.
 
     Returns
     -------
     xarray.Dataset
-        As `open_dataset` gives it; in memory, without a path.
+        The dataset as `open_dataset` returns it. Without a path it is in memory.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
     UsageError
         The dataset cannot be written, or would be larger than memory.
 
@@ -60,33 +60,38 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
 def runner(scene: SceneLike, keys: str | Sequence[str]) -> SceneRunner:
     """Open a scene as a function of some of its numbers: values in, arrays out, for optimisers and sliders.
 
-    A call runs one point from the scene's own start, as `run(scene.with_values(...))` does, bit for bit; or many points
-    at once, as a campaign over them does. Of a body with its own stops a point costs its motion and some tens of
-    microseconds; scenes that are coupled, measured or sampled take their time.
+    A call runs one point from the scene's own start, and agrees with `run(scene.with_values(...))` bit for bit. A call
+    with many points runs them as a campaign does. A body with its own stops costs its motion and some tens of
+    microseconds a point. Coupled, measured and sampled scenes take longer.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        Its sweep is left out. Each key has a value in it.
+        Scene in which each key has a value; the sweep is ignored.
     keys : str or sequence of str
-        What calls give values to, in SI or the units of the scene: keys that a sweep may vary.
+        Keys that each call gives values, in SI or the units of the scene; a sweep must be able to vary them.
 
     Returns
     -------
     SceneRunner
-        Called with values of shape (key,), or a number where there is one key, it returns a dict of arrays by the names
-        of a [dataset](dataset.md): `final_displacement` (m) and `outcome` have the shape (), `displacement_max` (m) and
-        others of each period (period,), `impact_time` (s) and others of each impact (impact,). With values of shape
-        (point, key) all of them have a first dimension of points, but for impacts, sticks and samples, which are one
-        after the other: `impact_count` says how many each point has. What a run cannot do is its `outcome`, and in
-        `message`. It is a context manager, pickles, and serves one thread at a time.
+        A callable, which takes values of shape (key,), or a number for a single key. It returns a dict of arrays, named
+        as in a [dataset](dataset.md):
+
+        - `final_displacement` (m) and `outcome` have the shape ();
+        - `displacement_max` (m) and other results of each period have the shape (period,);
+        - `impact_time` (s) and other results of each impact have the shape (impact,).
+
+        Values of shape (point, key) run many points, and the arrays get a first dimension of points. Impacts, sticks
+        and samples of all points are concatenated instead; `impact_count` is the number of impacts of each point.
+        `outcome` and `message` report runs that could not finish. A runner is a context manager, can be pickled, and
+        serves one thread at a time.
 
     Raises
     ------
     SceneError
-        A key cannot be varied. Calls raise it for values that a sweep refuses, with the same words.
+        A key cannot be varied. A call raises SceneError for values that a sweep refuses, with the same words.
     UsageError
-        A key has no value in the scene. Calls raise it for values of another shape.
+        A key has no value in the scene. A call raises UsageError for values of another shape.
 
     Examples
     --------
@@ -104,16 +109,17 @@ def runner(scene: SceneLike, keys: str | Sequence[str]) -> SceneRunner:
 
 
 def cost_of(scene: SceneLike) -> SceneCost:
-    """Run one point of a scene and say what all of them would cost, as `vibroimpact check` does.
+    """Run one point of a scene and estimate the cost of all points, as `vibroimpact check` does.
 
     Parameters
     ----------
     scene : Scene, path or mapping
+        A scene, the file of a scene or of a system (SSP), or the tables of a scene.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
 
     Examples
     --------

@@ -22,33 +22,33 @@ def sensitivity(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> xr.Dataset:
-    """Estimate how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
+    """Estimate the share of each result's variance that each drawn key of a campaign explains (Sobol indices).
 
     Parameters
     ----------
     dataset : xarray.Dataset or path
-        A campaign with `sample = { design = "saltelli", ... }`, opened, or its file or folder.
+        Dataset, file or folder of a campaign with `sample = { design = "saltelli", ... }`.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
     of : str or sequence of str
-        Quantities to look at: `displacement_range`, ...; none: all that there are.
+        Quantities to analyse, for example `displacement_range`. By default all quantities are analysed.
     level : float
-        Of the bootstrap intervals.
+        Confidence level of the bootstrap intervals.
     resamples, seed : int
-        Of the bootstrap.
+        Number of bootstrap resamples, and the seed of their random numbers.
 
     Returns
     -------
     xarray.Dataset
-        `first_order`, `total_order`, `first_order_interval` and `total_order_interval` on `quantity`, `parameter` and
-        the other keys of the sweep; `attrs["remarks"]` says what was left out.
+        `first_order`, `total_order`, `first_order_interval` and `total_order_interval` have the dims `quantity`,
+        `parameter` and the other keys of the sweep. `attrs["remarks"]` lists what was left out.
 
     Raises
     ------
     DatasetError
-        The dataset has no whole Saltelli design, or nothing that varies over it.
+        The dataset has no whole Saltelli design, or no result varies over the design.
     UsageError
-        There is no such quantity; or the level, the number of resamples or the seed makes no sense.
+        A quantity is unknown; or the level, the number of resamples or the seed makes no sense.
 
     Examples
     --------

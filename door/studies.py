@@ -1,4 +1,4 @@
-"""Measured studies of a scene: what accuracy costs, and what each effect costs and changes."""
+"""Measured studies of a scene: the cost of accuracy, and the cost and influence of each effect."""
 
 from __future__ import annotations
 
@@ -19,34 +19,36 @@ def accuracy(
     of: str = "all",
     budget: float = BUDGET,
 ) -> xr.Dataset:
-    """Simulate a scene in all ways that it can be, and measure what the accuracy of each costs in time.
+    """Simulate a scene with every method that fits it, and measure the error of each method and its cost in time.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        Its sweep is left out.
+        Scene to simulate; the sweep is ignored.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
     tolerance : float, optional
-        Relative error for which the cheapest way is looked for.
+        Relative error that the recommended method must reach; the cheapest such method is chosen.
     of : str
-        What errors are of: `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`, or `all`.
+        Quantity whose error counts: `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`,
+        or `all`.
     budget : float
-        Processor time to spend, of all processes, s: kept within a factor of 1.5, 10 at least.
+        Processor time of all processes, s, at least 10. The study keeps it within a factor of 1.5.
 
     Returns
     -------
     xarray.Dataset
-        `error` and `cost` (s) of each `way`, what is wrong with it (`failure`); `attrs["verdict"]` says what to choose.
+        Each `way` (method) has its `error`, its `cost` (s), and a `failure` in words where it failed.
+        `attrs["verdict"]` recommends a method.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
     UsageError
-        There is nothing to vary, no such quantity, a budget below 10 s or below what the scene needs, no place for the
-        file, or no way reaches the tolerance. Only the last takes the time of a study, unless the reference is known to
-        less.
+        The scene leaves nothing to vary, the quantity is unknown, or the file cannot be written. The budget is below
+        10 s or below the needs of the scene. No method reaches the tolerance: this error alone takes the time of a
+        study, unless the reference itself is less accurate than the tolerance.
 
     Examples
     --------
@@ -63,28 +65,28 @@ def accuracy(
 
 
 def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
-    """Run a scene with and without each effect that it asks for, and measure what each costs and changes.
+    """Run a scene with and without each of its effects, and measure the cost and the influence of each effect.
 
     Parameters
     ----------
     scene : Scene, path or mapping
-        Its sweep is left out.
+        Scene to simulate; the sweep is ignored.
     path : path, optional
-        The dataset to write as well (.nc).
+        Dataset file to write as well (.nc).
 
     Returns
     -------
     xarray.Dataset
-        `share` of the time of a run, `change` without it (relative) and `changes` (in words) of each `effect`, the
-        dearest first; `statistics` in words where impacts are lost or the motion is chaotic;
-        `attrs["not_simulated"]` lists what the scene does not call for.
+        Effects along `effect`, the most expensive first. Each has its `share` of the run time, the relative `change` of
+        the results without it, and the `changes` in words. `statistics` describes, in words, lost impacts and chaotic
+        motion. `attrs["not_simulated"]` lists the effects that the scene does not ask for.
 
     Raises
     ------
     SceneError
-        With all problems of the scene, each on one line.
+        The scene is wrong; the message lists all problems, one a line.
     UsageError
-        The dataset cannot be written there.
+        The dataset cannot be written.
 
     Examples
     --------

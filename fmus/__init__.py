@@ -1,4 +1,4 @@
-"""The physics: FMUs, how they are built, checked, found and exported.
+"""The physics: FMUs, and the functions that build, check, find and export them.
 
 >>> from vibroimpact.fmus import components, fmu_path
 >>> "Oscillator" in components()
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 __all__ = ["component_name", "components", "export", "fmu_path"]
 
 
-if not TYPE_CHECKING:  # else every name would be one
+if not TYPE_CHECKING:  # a type checker that saw `__getattr__` would accept any name
 
     def __getattr__(name: str) -> object:
-        # The installation builds the FMUs before anything that an export needs is installed.
+        # The installation builds the FMUs before the packages that an export needs are installed.
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         import importlib

@@ -1,9 +1,8 @@
-"""Limits that the system puts on a process that reads files of strangers: time, memory, no writing, no network.
+"""Limits of the operating system on a process that reads untrusted files: time, memory, writing, network.
 
-On Linux the rules of landlock (kernel 5.13) forbid to open a file for writing, to make, remove or rename one, to start
-a program; from its version 4 on also TCP connections, from 6 on signals to processes outside. No package of it is
-maintained, so that its system calls are made here. A kernel without landlock keeps files from growing
-(`RLIMIT_FSIZE`).
+On Linux, landlock (kernel 5.13) forbids to write, make, remove or rename files, and to start programs. Its version 4
+adds TCP connections, version 6 adds signals to processes outside. This module makes the system calls itself, since
+no package for landlock is maintained. On a kernel without landlock, `RLIMIT_FSIZE` still keeps files from growing.
 """
 
 from __future__ import annotations
@@ -15,18 +14,18 @@ import signal
 import sys
 from pathlib import Path
 
-#: Wall time that a process gets, as a multiple of its processor time: the machine may be busy with other work.
+#: Limit of the wall time, as a multiple of the limit of the processor time: other work may keep the machine busy.
 PATIENCE = 6.0
 UNKNOWN_MEMORY = 8 * 2**30
-"""Memory that is assumed where the system does not say it, byte."""
+"""Memory to assume, byte, where the system does not report it."""
 _CGROUP = Path("/sys/fs/cgroup/memory.max")
-#: Numbers of the system calls, equal on all architectures that Python packages are built for.
+#: Numbers of the system calls, equal on all architectures with Python packages.
 _CREATE_RULESET, _RESTRICT_SELF = 444, 446
 _ASK_VERSION = 1
-#: Options of Linux' prctl.
+#: Options of Linux's prctl.
 _PARENT_DEATH_SIGNAL = 1
 _NO_NEW_PRIVILEGES = 38
-#: Rights of version 1: all but reading files and folders (bits 2 and 3); then what later versions have added.
+#: Rights of version 1: all but reading files and folders (bits 2 and 3); then the rights that later versions added.
 _EXECUTE, _CHANGE = 0b1, 0b1_1111_1111_0010
 _LATER = {2: 1 << 13, 3: 1 << 14, 5: 1 << 15}
 _BIND_AND_CONNECT = 0b11
@@ -34,23 +33,23 @@ _SOCKETS_AND_SIGNALS = 0b11
 
 
 class _Ruleset(ctypes.Structure):
-    """`struct landlock_ruleset_attr`: what is forbidden unless a rule allows it; here no rule does."""
+    """`struct landlock_ruleset_attr`: actions that are forbidden without a rule; this process sets no rule."""
 
     _fields_ = (("files", ctypes.c_uint64), ("network", ctypes.c_uint64), ("scopes", ctypes.c_uint64))
 
 
 def confine(seconds: float, memory: int) -> None:
-    """Let the system end this process after a processor time, and refuse it more memory, writing and network.
+    """End this process after a processor time (s), and deny it more memory, writing and network.
 
-    Of wall time (s) it gets `PATIENCE` times as much. Memory is counted in bytes beyond what it has now, never more
-    than the machine has.
+    The limit of the wall time is `PATIENCE` times the processor time. `memory` (byte) is counted beyond the present
+    use, and never exceeds the memory of the machine.
     """
     import resource
 
     _let_signals_end_it()
     signal.setitimer(signal.ITIMER_PROF, seconds)
     signal.setitimer(signal.ITIMER_REAL, PATIENCE * seconds)
-    lower_limit(resource.RLIMIT_CPU, math.ceil(seconds) + 1)  # code that stops a timer does not stop this
+    lower_limit(resource.RLIMIT_CPU, math.ceil(seconds) + 1)  # holds when code stops the timers
     lower_limit(resource.RLIMIT_CORE, 0)
     lower_limit(resource.RLIMIT_FSIZE, 0)
     lower_limit(resource.RLIMIT_AS, _address_space() + min(memory, machine_memory()))
@@ -58,7 +57,7 @@ def confine(seconds: float, memory: int) -> None:
 
 
 def end_with_parent(parent: int) -> None:
-    """Let the system end this process with the one that made it, where it can: on Linux."""
+    """Let the system end this process together with its parent; only Linux can."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
         if os.getppid() != parent:
@@ -66,7 +65,7 @@ def end_with_parent(parent: int) -> None:
 
 
 def machine_memory() -> int:
-    """Return the memory that this machine, or this container, has, byte."""
+    """Return the memory of this machine, or of this container, byte."""
     try:
         found = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
@@ -79,7 +78,7 @@ def machine_memory() -> int:
 
 
 def _let_signals_end_it() -> None:
-    """Let signals that limit or stop this process end it, whatever its maker does with them; ignored ones stay so."""
+    """Let signals of limits and stops end this process, whatever its parent set; ignored stops stay ignored."""
     limits = {signal.SIGALRM, signal.SIGPROF, signal.SIGXCPU}
     stops = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
     ending = limits | {number for number in stops if signal.getsignal(number) != signal.SIG_IGN}
@@ -90,7 +89,7 @@ def _let_signals_end_it() -> None:
 
 
 def _address_space() -> int:
-    """Return the address space of this process, bytes; 0 where the system does not say it."""
+    """Return the address space of this process, bytes; 0 where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     except (OSError, ValueError):
@@ -99,7 +98,7 @@ def _address_space() -> int:
 
 
 def lower_limit(limit: int, value: int) -> None:
-    """Set a limit of this process for good, where the system does not have a lower one already."""
+    """Lower a limit of this process for good; a limit that is already lower stays."""
     import resource
 
     now, _ = resource.getrlimit(limit)
@@ -107,17 +106,17 @@ def lower_limit(limit: int, value: int) -> None:
         try:
             resource.setrlimit(limit, (value, value))
         except (ValueError, OSError):
-            return  # macOS knows some limits and sets none
+            return  # macOS declares some limits that it cannot set
 
 
 def forbid_writing_and_network() -> int:
-    """Forbid this process what landlock can, for good; return its version, 0 where the kernel has none."""
+    """Forbid this process all that landlock can, for good; return its version, 0 on a kernel without landlock."""
     if sys.platform != "linux":
         return 0
     system = ctypes.CDLL(None, use_errno=True)
     version = int(system.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(_ASK_VERSION)))
     if version < 1:
-        return 0  # not built in, or switched off
+        return 0  # the kernel was built without landlock, or it is switched off
     later = sum(right for since, right in _LATER.items() if version >= since)
     rules = _Ruleset(
         _EXECUTE | _CHANGE | later,

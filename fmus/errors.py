@@ -1,7 +1,7 @@
-"""The errors that vibroimpact raises on purpose; each is one clear message for a person.
+"""Errors that vibroimpact raises on purpose; each is one clear message for a person.
 
-Only misuse and broken components raise. What the physics does (chatter, sticking, no contact) is an
-outcome in the dataset, never an exception.
+Only misuse and broken components raise. Effects of the physics (chatter, sticking, no contact) are an outcome in the
+dataset, never an exception.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from vibroimpact.fmus.messages import joined, message, typed
 
 
 class VibroimpactError(Exception):
-    """Base of all errors of this package; `exit_code` is what the command line returns.
+    """Base of all errors of this package; the command line returns its `exit_code`.
 
-    Its text names arguments as Python writes them; `typed` is the text of the command line.
+    The text names arguments in Python's spelling; `typed` is the text with options of the command line.
     """
 
     exit_code = 1
@@ -32,12 +32,12 @@ class VibroimpactError(Exception):
         return typed(self.message)
 
     def named(self, name: object) -> Self:
-        """Return the error with the name of a file, or of what else it is about, before its text."""
+        """Return the error with the name of a file, or of another subject, before its text."""
         return type(self)(message(f"{name}: ", self.message))
 
 
 class UsageError(VibroimpactError):
-    """A command was given what it cannot use: a folder that cannot be written, an address without a scheduler."""
+    """A command was given an unusable value: a folder that cannot be written, an address without a scheduler."""
 
     exit_code = 2
 
@@ -58,7 +58,7 @@ class SceneError(VibroimpactError):
         super().__init__(joined("\n", self.problems))
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[str, ...]]]:
-        """Pickle the problems, not the message made of them: errors travel between processes."""
+        """Pickle the problems, not the message made from them: errors travel between processes."""
         return type(self), (self.problems,)
 
 
@@ -68,11 +68,11 @@ class ComponentError(VibroimpactError):
     Attributes
     ----------
     instance, function : str
-        The instance and the FMI function that failed; empty where there was none.
+        The instance and the FMI function that failed; empty if there was none.
     time : float or None
         Simulation time of the failing call, s.
     log : tuple of str
-        The last lines the component logged.
+        The last lines that the component logged.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class DatasetError(VibroimpactError):
 
 
 class CampaignError(VibroimpactError):
-    """A campaign could not finish; what is complete stays and the same command resumes it."""
+    """A campaign could not finish; its complete parts stay, and the same command resumes it."""
 
 
 class WorkersGoneError(CampaignError):

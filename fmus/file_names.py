@@ -1,4 +1,4 @@
-"""Names of files that are text: scenes, manifests and datasets hold names, and the NetCDF library opens no others."""
+"""File names that are text: scenes, manifests and datasets store names, and the NetCDF library opens no other names."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vibroimpact.fmus.errors import UsageError
 
 
 def is_text(value: object) -> bool:
-    """Return whether a value is text that a file can hold: halves of surrogate pairs are none.
+    """Return whether a value is text that a file can hold; an unpaired surrogate is not.
 
     >>> is_text("café"), is_text(os.fsdecode(b"caf" + bytes([0xE9])))
     (True, False)
@@ -23,7 +23,7 @@ _DEVICES = frozenset(
 
 
 def is_device(name: str) -> bool:
-    """Return whether Windows takes the name of a file for one of its devices, whatever ending it has.
+    """Return whether Windows takes a file name for one of its devices, whatever its extension.
 
     >>> is_device("con.nc"), is_device("LPT1.tar.gz"), is_device("console.nc")
     (True, True, False)
@@ -32,12 +32,12 @@ def is_device(name: str) -> bool:
 
 
 def refuse_no_text(path: str | os.PathLike[str]) -> None:
-    """Refuse the name of a file or folder that is no text, as one from a system with another encoding.
+    """Raise UsageError if the name of a file or folder is not text, as a name from a system with another encoding.
 
     Raises
     ------
     UsageError
-        With the name.
+        The name is not text; the message shows it.
     """
     if not is_text(os.fspath(path)):
         encoding = sys.getfilesystemencoding()

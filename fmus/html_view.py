@@ -1,4 +1,4 @@
-"""Small tables in HTML, as notebooks show objects. Names come from files of strangers: everything is escaped."""
+"""Small HTML tables of objects for notebooks. Names come from untrusted files: everything is escaped."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from html import escape
 from vibroimpact.fmus.printable import printable
 
 MOST_ROWS = 30
-"""Rows that are shown; the rest is counted."""
+"""Number of rows shown; further rows are only counted."""
 
 
 def html_table(caption: str, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -17,11 +17,11 @@ def html_table(caption: str, headings: Sequence[str], rows: Iterable[Sequence[ob
     Parameters
     ----------
     caption : str
-        Above the table.
+        Caption above the table.
     headings : sequence of str
-        Of the columns; none: a table of names and values.
+        Headings of the columns; none: a table of names and values.
     rows : iterable of sequence
-        Cells are shown as `str` gives them, numbers with six digits.
+        Rows of cells, shown by `str`, numbers with six digits.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Messages that name arguments: in Python by what a call writes, on the command line by the options that one types.
+"""Messages that name arguments: as keywords in Python, as options on the command line.
 
-Who makes a message does not know who reads it. So a message has both spellings, and whoever shows it takes one of them.
+The code that makes a message does not know its reader. So a message has both spellings, and its display picks one.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple, Self
 
 _OPTIONS = {"baseline_window": "baseline", "start": "from", "stop": "to"}
-"""Options that have another name than the argument."""
+"""Options whose name differs from the argument's."""
 
 
 def option_of(argument: str) -> str:
-    """Return the option for an argument.
+    """Return the option of an argument.
 
     >>> option_of("start"), option_of("time_column")
     ('--from', '--time-column')
@@ -22,16 +22,16 @@ def option_of(argument: str) -> str:
 
 
 class Either(NamedTuple):
-    """Words that differ where no argument is named."""
+    """Words that differ between Python and the command line, without naming an argument."""
 
     called: str
     typed: str
 
 
 CALL = Either("call", "command")
-"""What is repeated: `The same call resumes.`"""
+"""The noun for the request: `The same call resumes.`"""
 WITH_OUTPUT = Either("", " with -o")
-"""How another file or folder is chosen."""
+"""The hint for the choice of another file or folder."""
 
 
 class Argument(NamedTuple):
@@ -48,30 +48,30 @@ class Argument(NamedTuple):
 
     @property
     def called(self) -> str:
-        """What Python writes."""
+        """The spelling in Python."""
         return self.name if self.value == "" else f"{self.name}={self.value!r}"
 
     @property
     def typed(self) -> str:
-        """What the command line writes."""
+        """The spelling on the command line."""
         option = option_of(self.name)
         return f"--no-{option[2:]}" if self.value is False else f"{option} {self.value}".rstrip()
 
 
 class Message(str):
-    """A text that names arguments: as Python writes them, with the words of the command line beside it.
+    """A text that names arguments as Python writes them, together with the command line's spelling.
 
     Attributes
     ----------
     typed : str
-        The same with options.
+        The same text with options.
     """
 
     __slots__ = ("typed",)
     typed: str
 
     def __new__(cls, called: str, typed: str) -> Self:
-        """Return a message of both spellings; `message` makes one of parts."""
+        """Return a message of both spellings; `message` makes one from parts."""
         made = super().__new__(cls, called)
         made.typed = typed
         return made
@@ -83,11 +83,11 @@ class Message(str):
 
 Part = str | Argument | Either
 Spelling = Callable[[str], str]
-"""From a message to the text that is shown: `typed`, or `str` for Python's spelling of arguments."""
+"""Function from a message to the displayed text: `typed`, or `str` for Python's spelling."""
 
 
 def message(*parts: Part) -> Message:
-    """Return the parts as one message; those that are messages keep both spellings.
+    """Return the parts as one message; parts that are messages keep both spellings.
 
     >>> made = message("Choose another", Either("", " with -o"), ", or widen ", Argument("start"), ".")
     >>> made, made.typed
@@ -103,7 +103,7 @@ def joined(separator: str, texts: Iterable[str]) -> Message:
 
 
 def reworded(text: str, change: Callable[[str], str]) -> str:
-    """Return a text that was changed, in both spellings where it has two.
+    """Return a changed text, changed in both spellings if it is a message.
 
     >>> reworded(message("Give ", Argument("rate"), "."), str.upper).typed
     'GIVE --RATE.'
@@ -123,7 +123,7 @@ def lines_of(text: str) -> list[str]:
 
 
 def spelled(attributes: Mapping[str, Any], spelling: Spelling) -> dict[str, Any]:
-    """Return attributes as they are written to a file: their messages in one spelling, that of `typed` or `str`."""
+    """Return attributes as a file stores them: messages in one spelling, by `typed` or `str`."""
     return {
         name: spelling(value) if isinstance(value, Message) else value for name, value in attributes.items()
     }
@@ -158,11 +158,11 @@ _DURATIONS = (
     (7200.0, "min", 1 / 60),
     (172800.0, "h", 1 / 3600),
 )
-"""Wall times below which a unit is used, s; its name, and how many of it are a second."""
+"""Upper limits of wall time for each unit, s; the unit's name, and its number per second."""
 
 
 def duration(seconds: float) -> str:
-    """Return a wall time as a person reads it, with two digits.
+    """Return a wall time for a reader, with two digits.
 
     >>> duration(2.34e-3), duration(59.6), duration(5000.0), duration(4e6)
     ('2.3 ms', '60 s', '83 min', '46 days')

@@ -9,20 +9,20 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 _ROUNDING = 1e-9
-"""Relative standard error below which it is rounding of the arithmetic, and says nothing of the data."""
+"""Relative standard error below which it is only rounding of the arithmetic."""
 _MOST_PLACES = 12
-"""Places behind the point; smaller errors are written with an exponent."""
+"""Largest number of decimals; numbers with smaller errors are written with an exponent."""
 _LARGE = 1e7
-"""Standard error from which on it is written with an exponent."""
+"""Standard error from which on the number is written with an exponent."""
 _SMALL = 1e-4
-"""Value below which it is written with an exponent."""
+"""Value below which the number is written with an exponent."""
 
 
 def table(title: str, *headings: str, rows: Iterable[Iterable[str]] = ()) -> Table:
     """Return a table.
 
-    A heading begins with `<` for words, which go on in the next line where the terminal is narrow, or with `>` for
-    numbers, which do not.
+    A heading begins with `<` or `>`. `<` marks words, which wrap where the terminal is narrow; `>` marks numbers, which
+    do not wrap.
     """
     made = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
     for heading in headings:
@@ -36,7 +36,7 @@ def table(title: str, *headings: str, rows: Iterable[Iterable[str]] = ()) -> Tab
 
 
 def value_and_error(value: float, error: float) -> tuple[str, str]:
-    """Return value and standard error with as many digits as the error allows: two of its own.
+    """Return value and standard error, with the digits that the error allows: two digits of the error.
 
     >>> value_and_error(0.00556754, 0.0000610394), value_and_error(438.6585, 0.02306)
     (('0.005568', '0.000061'), ('438.659', '0.023'))

@@ -1,7 +1,7 @@
-"""Folders of the user's cache that nobody else can write: what lies there is loaded and believed.
+"""Folders of the user's cache that nobody else can write: their content is loaded and trusted.
 
-Everything below the cache folder has mode 0700. A folder of another user, or one that others may write, is refused:
-whoever can write it chooses the code that runs.
+Everything below the cache folder has mode 0700. A folder that another user owns or may write is refused: such a user
+could choose the code that runs.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 class UnsafeFolderError(Exception):
-    """Somebody else owns a folder or may write it; its text says who, and what to do."""
+    """Another user owns a folder or may write it; the text names the user, and the remedy."""
 
 
 def private_folder(name: str) -> Path:
-    """Return a folder in the cache that only this user can write; it is made where it is not there.
+    """Return a folder in the cache that only this user can write; make it if it is absent.
 
-    The cache is `$VIBROIMPACT_CACHE`, else the user's cache folder of the system.
+    The cache is `$VIBROIMPACT_CACHE`, by default the user's cache folder of the system.
 
     Raises
     ------
     UnsafeFolderError
-        It, or the cache folder, is another user's or can be written by others.
+        Another user owns the folder or the cache folder, or may write it.
     OSError
-        It cannot be made.
+        The folder cannot be made.
     """
     chosen = os.environ.get(CACHE_VARIABLE)
     root = Path(chosen) if chosen else platformdirs.user_cache_path("vibroimpact")
@@ -38,7 +38,7 @@ def private_folder(name: str) -> Path:
     folder = root / name
     folder.mkdir(mode=0o700, exist_ok=True)
     refuse_links(folder)
-    # a folder that the user chose may hold other things and keeps its mode; the others are ours alone
+    # a folder that the user chose may hold other things and keeps its mode; the others belong to this package
     for place, ours in ((root, not chosen), (folder, True)):
         if chosen:
             refuse_unsafe(place)
@@ -49,16 +49,16 @@ def private_folder(name: str) -> Path:
 
 
 def refuse_links(folder: Path) -> None:
-    """Raise UnsafeFolderError where a folder is a link, which leads where nobody looked."""
+    """Raise UnsafeFolderError if a folder is a link, whose target was not checked."""
     if folder.is_symlink():
         raise UnsafeFolderError(f"{folder}: expected a folder, got a link. Delete the link.")
 
 
 def refuse_unsafe(folder: Path) -> None:
-    """Raise UnsafeFolderError where another user owns a folder, or others may write it.
+    """Raise UnsafeFolderError if another user owns a folder, or others may write it.
 
-    The superuser may own it, who can change everything anyway. With the sticky bit (as /tmp has it), others can
-    make names in a folder but replace none.
+    The superuser, who can change everything anyway, may own it. With the sticky bit (as /tmp has it), others can add
+    names to a folder but replace none.
     """
     if not hasattr(os, "geteuid"):
         return  # systems without owners and modes keep the folders of users apart by themselves
@@ -77,6 +77,6 @@ def refuse_unsafe(folder: Path) -> None:
 
 
 def _close_to_others(folder: Path) -> None:
-    """Give a folder of this user mode 0700, which version 0.1 did not."""
+    """Set mode 0700 on a folder of this user; version 0.1 left it open."""
     if hasattr(os, "geteuid") and folder.stat().st_uid == os.geteuid():
         folder.chmod(0o700)

@@ -1,8 +1,8 @@
-"""The process in which files of strangers are read: whatever damaged bytes do to the libraries, they do it here.
+"""The process that reads untrusted files: damaged bytes can do harm to the libraries only here.
 
-Each file is read in a process of its own, made by `fork` from one in which the libraries are imported already, and
-limited by `confinement`. Run as a file, this module is a server that forks: each line of standard input is an order, a
-JSON object. The answer is a line of JSON: {"verdict": "read" | "raised" | "late" | "died", ...}, for "read" with the
+Each file is read in a separate process, a `fork` of one with the libraries already imported, and limited by
+`confinement`. Run as a file, this module is a server that forks. Each line of standard input is an order, a JSON
+object. The answer is a line of JSON: {"verdict": "read" | "raised" | "late" | "died", ...}. For "read" it has the
 sizes of the buffers whose bytes follow. Nothing is pickled.
 """
 
@@ -23,7 +23,7 @@ from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.processes.child import write_whole
 from vibroimpact.fmus.processes.fork import forked
 
-#: After this time without a file to read the server ends, s.
+#: Time without a file to read after which the server ends, s.
 IDLE = 30.0
 LONGEST_TEXT = 20_000
 _LATE = frozenset(
@@ -32,21 +32,21 @@ _LATE = frozenset(
 
 
 def import_libraries(order: Mapping[str, Any]) -> None:
-    """Import what reads the file of an order, once for all files."""
+    """Import the libraries for the file of an order, once for all files."""
     for name in (*order["libraries"], order["reader"].partition(":")[0]):
-        with contextlib.suppress(ImportError):  # the reader says what is not installed
+        with contextlib.suppress(ImportError):  # the reader reports missing libraries
             importlib.import_module(name)
 
 
 def read_in_limits(order: Mapping[str, Any], parent: int, answers: int, begins: int | None = None) -> None:
-    """Read a file, by an `Order` as a mapping, within limits, and answer; this process is a fork that does no more.
+    """Read a file, by an `Order` as a mapping, within limits, and answer; this process is a fork for this file alone.
 
-    It ends with its parent. The descriptors are of the answer, and of a byte that says that it begins.
+    The process ends with its parent. The descriptors are for the answer, and for a byte that announces its beginning.
     """
     end_with_parent(parent)
     confine(order["seconds"], order["memory"])
     message = read_here(order)
-    for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # whoever takes the answer may be slow
+    for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):  # the receiver of the answer may be slow
         signal.setitimer(timer, 0.0)
     if begins is not None:
         os.write(begins, b"1")
@@ -54,14 +54,14 @@ def read_in_limits(order: Mapping[str, Any], parent: int, answers: int, begins: 
 
 
 def read_here(order: Mapping[str, Any]) -> list[Any]:
-    """Read the file of an order in this process; return the line that answers and its buffers."""
+    """Read the file of an order in this process; return the line of the answer and its buffers."""
     try:
         module, _, function = order["reader"].partition(":")
         facts, buffers = getattr(importlib.import_module(module), function)(order["path"], order["options"])
         views = [memoryview(buffer).cast("B") for buffer in buffers]
         found = {"verdict": "read", "facts": facts, "sizes": [view.nbytes for view in views]}
         return [_line(found), *views]
-    # whatever it is, it is what the file does to its reader
+    # any exception is an effect of the file on its reader
     except BaseException as error:
         return [_line(_raised(error))]
 
@@ -80,7 +80,7 @@ def _raised(error: BaseException) -> dict[str, Any]:
 
 
 def how_it_ended(status: int) -> dict[str, str]:
-    """Return the answer for a process that has not answered, by the status of its end."""
+    """Return the answer for a process that ended without one, from the status of its end."""
     ended_by = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
     return {"verdict": "late" if ended_by in _LATE else "died", "error": str(ended_by or "")}
 
@@ -90,27 +90,27 @@ def _line(found: dict[str, Any]) -> bytes:
 
 
 def _read_in_fork(order: dict[str, Any], answers: int) -> None:
-    """Let a process of its own read the file of an order, and answer; say how it ended where it does not."""
+    """Let a separate process read the file of an order, and answer; report its end if it does not answer."""
     has_begun, begins = os.pipe()
     server = os.getpid()
     process = forked(lambda: read_in_limits(order, server, answers, begins))
     os.close(begins)
     with os.fdopen(has_begun, "rb") as pipe:
-        # standard input speaks only when nobody waits for this answer any more
+        # standard input has data only when nobody waits for this answer any more
         if select.select([0, pipe.fileno()], [], [])[0] == [0]:
             os.kill(process, signal.SIGKILL)
         answered = pipe.read()
     _, status = os.waitpid(process, 0)
     if status and answered:
-        os._exit(1)  # within its answer, which nobody can read on from
+        os._exit(1)  # in the middle of its answer, which nobody can continue to read
     if not answered:
         write_whole(answers, [_line(how_it_ended(status))])
 
 
 def main() -> None:
-    """Answer orders until standard input ends, or none has come for a while."""
+    """Answer orders until standard input ends, or no order comes for `IDLE` s."""
     answers = os.dup(1)
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # text printed by a library must not mix with the answers
     forks = hasattr(os, "fork")
     while not forks or select.select([0], [], [], IDLE)[0]:
         line = sys.stdin.buffer.readline()

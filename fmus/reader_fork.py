@@ -1,7 +1,7 @@
-"""Lets a fork of this process read a file of a stranger: nothing has to be imported again.
+"""Reading of an untrusted file in a fork of this process, which needs no imports.
 
-A fork has the memory of this process, and none of its descriptors: it can write nothing and tell nobody. It lacks the
-other threads; one that waits for a lock of theirs is given up, and says nothing of the file.
+A fork has the memory of this process and none of its descriptors: it can neither write nor send anything. It lacks the
+other threads. A fork that waits for one of their locks is abandoned; this says nothing about the file.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from vibroimpact.fmus.processes.fork import forked
 from vibroimpact.fmus.reader_child import how_it_ended, import_libraries, read_in_limits
 from vibroimpact.fmus.reader_orders import Answer, Order, received
 
-#: Wall time beyond that of the limits after which a fork is killed, s: the fork itself ends before.
+#: Wall time beyond the limits after which a fork is killed, s; normally the fork ends itself before.
 GRACE = 10.0
-#: Wall time after which a fork that sleeps and computes nothing is given up, s; one that waits for a disk is not.
+#: Wall time after which a sleeping fork without progress is abandoned, s; a fork that waits for a disk is not.
 PATIENCE_WITH_SLEEP = 3.0
-_GLANCE = 0.2
-"""Wall time between two looks at a fork, s."""
+_WATCH_INTERVAL = 0.2
+"""Interval between two checks of a fork, s."""
 _ANSWER = 3
 
 
 class _Watch:
-    """Kills a fork that takes too long, or waits for what never comes."""
+    """Watch that kills a fork if it takes too long, or waits in vain."""
 
     def __init__(self, process: int, seconds: float) -> None:
         self._process, self._deadline = process, time.monotonic() + seconds
@@ -40,7 +40,7 @@ class _Watch:
 
     def _look(self) -> None:
         before, since = "", time.monotonic()
-        while not self._over.wait(_GLANCE):
+        while not self._over.wait(_WATCH_INTERVAL):
             now = time.monotonic()
             seen = _asleep_at(self._process)
             if not seen or seen != before:
@@ -57,7 +57,7 @@ class _Watch:
 
 
 def _asleep_at(process: int) -> str:
-    """Return the processor time of a process that sleeps, as the system writes it; empty of one that does not."""
+    """Return the processor time of a sleeping process, as the system writes it; empty if the process is not asleep."""
     try:
         known = Path(f"/proc/{process}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
     except OSError:
@@ -66,9 +66,9 @@ def _asleep_at(process: int) -> str:
 
 
 def read_in_fork(order: Order) -> Answer | None:
-    """Let a fork of this process read a file; None where that says nothing of the file.
+    """Let a fork of this process read a file; return None if the outcome says nothing about the file.
 
-    A lock that a lost thread held is what a fork may wait for. A system may have no room for a fork.
+    The fork may wait for a lock that a lost thread held, or the system may have no room for a fork.
     """
     given = asdict(order)
     import_libraries(given)
@@ -101,7 +101,7 @@ def read_in_fork(order: Order) -> Answer | None:
 
 
 def _end(process: int) -> int:
-    """End a process that has nothing left to do, whatever it does; return its status, 0 where another took that."""
+    """Kill a process whose work is over; return its status, 0 if another thread has collected it."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
     try:
@@ -111,7 +111,7 @@ def _end(process: int) -> int:
 
 
 def _leave_all_files(answer: int) -> None:
-    """Let a fork keep no descriptor of the process that it was made from but that of its answer, as number 3."""
+    """Close all descriptors that a fork got from its parent, except the descriptor for its answer, as number 3."""
     import fcntl
 
     answer = fcntl.fcntl(answer, fcntl.F_DUPFD, _ANSWER + 1)

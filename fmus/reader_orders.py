@@ -1,6 +1,6 @@
-"""What the process that reads a file is asked, and what it answers: JSON and raw bytes, never a pickle.
+"""Orders to the process that reads a file, and its answers: JSON and raw bytes, never a pickle.
 
-The bytes of a file may have taken that process over, so that all it answers is bounded here.
+The bytes of a file may have taken over the reading process, so its answers are bounded here.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 from vibroimpact.fmus.messages import Message
 
-#: Bytes of the line that answers, at most: names and remarks.
+#: Longest line of an answer, bytes: it holds names and remarks.
 LONGEST_LINE = 1 << 26
 
 
@@ -25,19 +25,19 @@ class Order:
     Attributes
     ----------
     reader : str
-        Module and function, `package.module:function`: from path and options to what JSON can say and buffers.
+        Module and function, `package.module:function`; it takes path and options, and returns JSON values and buffers.
     path : str
-        Absolute.
+        Absolute path.
     options : mapping
-        Of what JSON can say.
+        Options that JSON can hold.
     seconds : float
-        Processor time, s.
+        Limit of the processor time, s.
     memory : int
-        Memory beyond what the process has when it begins, bytes.
+        Memory beyond that at the start of the process, bytes.
     most_bytes : int
-        Bytes that all buffers of the answer may have.
+        Largest size of all buffers of the answer together, bytes.
     libraries : tuple of str
-        Modules that are imported before a process is made for a file, where they are installed.
+        Modules to import before a process is made for a file, if they are installed.
     """
 
     reader: str
@@ -51,19 +51,19 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How reading a file ended.
+    """Outcome of reading a file.
 
     Attributes
     ----------
     verdict : str
         `read`, `raised`, `late` or `died`.
     facts : object
-        What the reader returned, from JSON.
+        Result of the reader, from JSON.
     buffers : list of bytearray
     error, text : str
         Name and text of the exception; for `late` and `died` the number of the signal.
     raised : OSError or None
-        The error of the system, where it was one.
+        The operating system's error, if it was one.
     """
 
     verdict: str
@@ -74,7 +74,7 @@ class Answer:
     raised: OSError | None = None
 
     def why(self, seconds: float) -> str:
-        """Return what a file is that was not read, to follow `got`."""
+        """Return the reason why a file was not read, to follow `got`."""
         if self.verdict == "raised":
             return f"{self.error}: {self.text}".rstrip(": ")
         if self.verdict == "late":
@@ -83,7 +83,7 @@ class Answer:
 
 
 def received(stream: io.BufferedReader, most_bytes: int) -> Answer | None:
-    """Return the answer that comes on a pipe; None where it ends too early, or is none."""
+    """Return the answer from a pipe; None if it is incomplete or malformed."""
     line = stream.readline(LONGEST_LINE)
     try:
         found = json.loads(line)

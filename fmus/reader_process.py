@@ -1,8 +1,8 @@
-"""Lets a process of its own read a file of a stranger; its answer is JSON and raw bytes, never a pickle.
+"""Reading of an untrusted file in a separate process, whose answer is JSON and raw bytes, never a pickle.
 
-A library may crash on damaged bytes, never end, or take all memory: `reader_child` is where it does so. On Linux a fork
-of this process reads (`reader_fork`). Elsewhere, and where a fork waits in vain or crashes, a server does: it starts
-with the first file, serves all that follow, and ends by itself when none comes.
+A library may crash on damaged bytes, run forever, or take all memory; it does so in `reader_child`. On Linux a fork of
+this process reads the file (`reader_fork`). On other systems, and after a fork that waits in vain or crashes, a
+server reads it. The server starts with the first file, serves all later ones, and ends by itself when idle.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from vibroimpact.fmus.reader_orders import Answer, Order, received
 
 __all__ = ["Answer", "Order", "ReaderServer", "read_apart"]
 
-#: Starting Python and importing the libraries, on a loaded machine, s.
+#: Longest time to start Python and import the libraries, on a loaded machine, s.
 START_SECONDS = 60.0
-#: What the process may take to end by itself, s.
+#: Longest time for the process to end by itself, s.
 STOP_SECONDS = 3.0
-#: Whether a fork reads first; the libraries of macOS are no good after one.
+#: Whether to try a fork first; on macOS the libraries do not survive a fork.
 FORKS = sys.platform == "linux"
 _CHILD = Path(__file__).with_name("reader_child.py")
 
 
 def read_apart(order: Order) -> Answer:
-    """Let a process of its own read a file: a fork of this one, or where that says nothing sure, one of the server's.
+    """Read a file in a separate process: a fork of this process, or the server's if the fork's outcome is unsure.
 
-    Any number of threads may ask.
+    Any number of threads may call this function.
     """
     answer = read_in_fork(order) if FORKS else None
     return _server.ask(order) if answer is None or _has_crashed(answer) else answer
 
 
 def _has_crashed(answer: Answer) -> bool:
-    """Return whether a fork has crashed: what it has of this process may be why, so that a fresh one tells."""
+    """Return whether a fork has crashed; inherited state may be the cause, so a fresh process decides."""
     return answer.verdict == "died" and answer.error != str(int(signal.SIGKILL))
 
 
@@ -55,10 +55,10 @@ class ReaderServer:
         self._process: Process | None = None
 
     def ask(self, order: Order) -> Answer:
-        """Return what reading the file of an order came to."""
+        """Return the outcome of reading the file of an order."""
         line = json.dumps(asdict(order)).encode() + b"\n"
         with self._lock:
-            # One that ended for want of work answers nothing, and one that the system ended says nothing of the file.
+            # A server that ended when idle gives no answer; one that the system ended says nothing about the file.
             answer = self._answer(line, order)
             if answer is None:
                 self._start()
@@ -71,7 +71,7 @@ class ReaderServer:
         self._process = Process(str(_CHILD), environment=environment)
 
     def _answer(self, line: bytes, order: Order) -> Answer | None:
-        """Return the answer; None where the process is gone, which it is some time after the order's."""
+        """Return the answer; None if the process is gone, at the latest some time after the limit of the order."""
         process = self._process
         if process is None:
             return None
@@ -82,20 +82,20 @@ class ReaderServer:
             write_whole(process.stdin.fileno(), [line])
             with open(process.stdout.fileno(), "rb", closefd=False) as stream:
                 answer = received(stream, order.most_bytes)
-            if answer is None:  # nothing more that it says would be an answer
+            if answer is None:  # further output would be no answer
                 process.kill()
                 process.wait()
             return answer
         except BrokenPipeError:
             return None
         except BaseException:
-            self.close()  # whoever asks next would get this answer
+            self.close()  # the next caller would get this answer
             raise
         finally:
             late.cancel()
 
     def close(self) -> None:
-        """End the process, which ends the one that reads."""
+        """End the server, and with it the process that reads."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -103,12 +103,12 @@ class ReaderServer:
         process.stdout.close()
 
     def forget(self) -> None:
-        """Let a process made by `fork` not read the answers of the one that it was made from."""
+        """Keep a child made by `fork` from reading the answers meant for its parent."""
         process, self._lock, self._process = self._process, threading.Lock(), None
         if process is not None:
             process.stdin.close()
             process.stdout.close()
-            process.returncode = 0  # it is no child of this one
+            process.returncode = 0  # the server is not a child of this process
 
 
 _server = ReaderServer()

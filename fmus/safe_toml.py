@@ -1,7 +1,7 @@
-"""TOML of strangers: parsed in time and memory in proportion to its size, or refused.
+"""Untrusted TOML: parsed in time and memory in proportion to its size, or refused.
 
-The parser of the standard library works through every prefix of a dotted key: one of 20,000 parts (40 kB) takes
-22 s and 1.6 GB. Nothing that vibroimpact reads has keys of more than four parts.
+The parser of the standard library works through every prefix of a dotted key. A key of 20,000 parts (40 kB) takes
+22 s and 1.6 GB. No file of vibroimpact has keys of more than four parts.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ import tomllib
 from typing import Any
 
 MOST_PARTS = 8
-"""Parts of a dotted key, or of the name of a table."""
+"""Largest number of parts of a dotted key, or of the name of a table."""
 
 _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?:^|[{{,\[])[ \t]*+(?>{_PART}[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}", re.MULTILINE)
 
 
 class TooDeepError(ValueError):
-    """A text is TOML of a depth that nothing here has.
+    """A text is TOML that is nested deeper than any file of vibroimpact.
 
     Attributes
     ----------
     line : int or None
-        Where, from 1; None where the parser only gave up.
+        Line of the problem, from 1; None if the parser only gave up.
     """
 
     def __init__(self, line: int | None) -> None:
@@ -32,14 +32,14 @@ class TooDeepError(ValueError):
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the document in a text.
+    """Return the TOML document in a text.
 
     Raises
     ------
     tomllib.TOMLDecodeError
         The text is not TOML.
     ValueError
-        A number has too many digits; or, a `TooDeepError`, keys have too many parts or values are nested too deep.
+        A number has too many digits; or, as `TooDeepError`, keys have too many parts or values are nested too deep.
 
     Examples
     --------

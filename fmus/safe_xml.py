@@ -1,7 +1,7 @@
-"""Parses XML from strangers: no document type, no entities, so nothing to expand and nothing to fetch.
+"""Parser for untrusted XML: no document type and no entities, so nothing to expand and nothing to fetch.
 
-A document is limited in size and given to the parser whole: expat 2.5 takes time that grows with the square of a token,
-1.5 s for one of 16 MiB in pieces and 0.1 s in one.
+A document is limited in size, and the parser gets it whole. The time of expat 2.5 grows with the square of a
+token's size. A token of 16 MiB takes 1.5 s in pieces and 0.1 s in one.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from xml.parsers import expat
 from vibroimpact.fmus.errors import ComponentFileError
 
 LARGEST_XML = 1 << 24
-"""Bytes of a document above which it is refused; a description of thousands of variables is below a million."""
+"""Largest size of a document, bytes; a description of thousands of variables is below a million."""
 
 
 def refuse_large(size: int, where: str) -> None:
-    """Raise ComponentFileError where a document has more than `LARGEST_XML` bytes; the message begins with `where`."""
+    """Raise ComponentFileError if a document has more than `LARGEST_XML` bytes; the message begins with `where`."""
     if size > LARGEST_XML:
         raise ComponentFileError(
             f"{where}: expected XML of at most {LARGEST_XML} bytes, got {size}. It was not read."
@@ -27,19 +27,19 @@ def refuse_large(size: int, where: str) -> None:
 def root_of(content: bytes, where: str, *, namespaces: bool = False) -> Element:
     """Parse a document and return its root; messages begin with `where`.
 
-    The parser itself reports declarations, so they are found in every encoding it reads.
+    The parser itself reports declarations, so they are found in every encoding that it reads.
 
     Parameters
     ----------
     content : bytes
     where : str
     namespaces : bool
-        Put the namespace in braces before each name that has one, whatever its prefix: `{http://...}System`.
+        Whether to put the namespace in braces before each name that has one, whatever its prefix: `{http://...}System`.
 
     Raises
     ------
     ComponentFileError
-        It is larger than `LARGEST_XML`, not well-formed, or it declares a document type or an entity.
+        The document is larger than `LARGEST_XML`, not well-formed, or declares a document type or an entity.
     """
     refuse_large(len(content), where)
     builder = TreeBuilder()
@@ -71,7 +71,7 @@ def _braced(name: str) -> str:
 
 
 class _DeclarationError(Exception):
-    """Carries what was declared out of the parser's callback."""
+    """Carries the kind of a declaration out of the parser's callback."""
 
 
 def _refuse_doctype(*_: object) -> NoReturn:

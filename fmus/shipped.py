@@ -1,4 +1,4 @@
-"""The FMUs that the package brings along: their names, and where they are."""
+"""The FMUs of the package: their names and paths."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FOLDERS = {"3.0": "fmi3", "2.0": "fmi2"}
 
 
 def components() -> tuple[str, ...]:
-    """Return the names of the components that the package has, built or not."""
+    """Return the names of the package's components, built or not."""
     return tuple(_folders())
 
 
@@ -27,7 +27,7 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
     name : str
         Name of the component in any spelling: `ImpactStop`, `impact_stop`, `impact-stop`.
     fmi : str
-        `3.0` or `2.0`.
+        Version of FMI, `3.0` or `2.0`.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
     Raises
     ------
     ComponentFileError
-        There is no such component (the nearest name is offered), or it was not built.
+        The component is unknown (the message offers the nearest name), or it was not built.
     """
     if fmi not in FOLDERS:
         raise ComponentFileError(f"{name}: expected FMI version {' or '.join(FOLDERS)}, got {fmi!r}.")
@@ -66,7 +66,7 @@ def component_name(name: str) -> str:
     Raises
     ------
     ComponentFileError
-        There is no such component; the nearest name is offered.
+        The component is unknown; the message offers the nearest name.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def component_name(name: str) -> str:
 
 
 def letters_of(name: str) -> str:
-    """Return the letters and digits of a name in lower case, which are the same in all its spellings.
+    """Return the letters and digits of a name in lower case, equal for all its spellings.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def component_folder(name: str) -> Path:
     Raises
     ------
     ComponentFileError
-        There is no such component; the nearest name is offered.
+        The component is unknown; the message offers the nearest name.
     """
     return package_folder() / "native" / _folders()[component_name(name)]
 
@@ -110,12 +110,12 @@ def _folders() -> dict[str, str]:
 
 @cache
 def _name_and_folder(path: Path, changed: int) -> tuple[str, str]:
-    # every request for an FMU asks for all names, and reading the tables of variables takes longer than the rest
+    # every request for an FMU asks for all names, and parsing the tables of variables would take most of its time
     table = path.read_text(encoding="utf-8").partition("[component]")[2].partition("\n[")[0]
     head = tomllib.loads(table)
     return head["name"], head["folder"]
 
 
 def package_folder() -> Path:
-    """Return the folder that the shipped FMUs are below."""
+    """Return the folder that contains the shipped FMUs, directly or deeper."""
     return Path(str(files("vibroimpact.fmus")))

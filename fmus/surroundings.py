@@ -1,7 +1,7 @@
-"""What this machine must have for processes that talk to each other: a current folder, loopback, and descriptors.
+"""Requirements of communicating processes on this machine: a current folder, loopback, and descriptors.
 
-Libraries meet a lack of them in threads of their own: it shows as tracebacks, an abort, or an answer that never comes.
-So all three are looked at before.
+Libraries hit the lack of one in their own threads, as a traceback, an abort, or an answer that never comes. So all
+three are checked before.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import message
 
 LOOPBACK = "127.0.0.1"
-"""Address of this machine itself, over which processes of one campaign, rig or service talk."""
+"""Address of this machine itself, over which the processes of a campaign, rig or service communicate."""
 
 REACH_SECONDS = 5.0
-"""How long a connection over loopback may take, s; one takes less than a millisecond."""
+"""Longest time for a connection over loopback, s; normally it takes less than a millisecond."""
 
 
 def leave_removed_folder(instead: Path) -> None:
-    """Make `instead` the current folder where that was removed: multiprocessing asks for its path."""
+    """Make `instead` the current folder if that was removed: multiprocessing asks for its path."""
     try:
         os.getcwd()
     except FileNotFoundError:
@@ -33,7 +33,7 @@ def leave_removed_folder(instead: Path) -> None:
 
 @contextmanager
 def in_a_folder_that_exists() -> Iterator[None]:
-    """Let a library be imported that asks for the current folder, also where that was removed."""
+    """Let a library that asks for the current folder be imported although that folder was removed."""
     try:
         os.getcwd()
     except FileNotFoundError:
@@ -50,15 +50,15 @@ def in_a_folder_that_exists() -> Iterator[None]:
 
 
 def refuse_few_descriptors(needed: int, whose: str, fewer: str = "") -> None:
-    """Raise UsageError where this process may not open so many more files.
+    """Raise UsageError if this process cannot open `needed` more files.
 
     Parameters
     ----------
     needed : int
     whose : str
-        Who needs them: `2 workers`.
+        Users of the files: `2 workers`.
     fewer : str
-        What else may be done, after `, or`.
+        Remedy in the message, after `, or`.
     """
     available = _available_descriptors(needed)
     if available < needed:
@@ -72,7 +72,7 @@ def refuse_few_descriptors(needed: int, whose: str, fewer: str = "") -> None:
 
 
 def _available_descriptors(most: int) -> int:
-    """Return how many more files this process may open now, `most` at most."""
+    """Return the number of further files that this process can open now, at most `most`."""
     held: list[int] = []
     try:
         while len(held) < most:
@@ -87,14 +87,14 @@ def _available_descriptors(most: int) -> int:
 
 
 def refuse_no_loopback(purpose: str, instead: str = "") -> None:
-    """Raise UsageError where nothing is reached over loopback.
+    """Raise UsageError if connections over loopback fail.
 
     Parameters
     ----------
     purpose : str
-        What is, after `over which`: `workers are reached`.
+        Purpose of loopback, after `over which`: `workers are reached`.
     instead : str
-        What else may be done, after `, or`.
+        Remedy in the message, after `, or`.
     """
     try:
         with (
@@ -113,5 +113,5 @@ def refuse_no_loopback(purpose: str, instead: str = "") -> None:
 
 
 def _or(other: str) -> tuple[str, ...]:
-    """Return the end of a sentence, with what else may be done."""
+    """Return the end of a sentence, with a further remedy."""
     return (", or ", other, ".") if other else (".",)

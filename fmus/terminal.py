@@ -1,11 +1,10 @@
-"""What is written to the terminal: no character of a file may move its cursor, colour it or turn its text around.
+"""Output to the terminal: no character from a file may move its cursor, set its colour or reverse its text.
 
-Names in files, scenes and the log lines of FMUs are strangers' text. Every message goes through `printable`: by `say`,
-or by a `Terminal`, which also takes square brackets as what they are.
+Names in files, scenes and the log lines of FMUs are untrusted text. Every message goes through `printable`: by `say`,
+or by a `Terminal`, which also prints square brackets as they are.
 
-Where nobody reads any more, as behind `| head`, nothing more is written, and the command goes on: what it computed is
-still to be saved. So it does where the terminal's text goes to a disk that is full, but this is said, and the command
-has failed.
+If the reader has gone, as behind `| head`, output stops and the command goes on, since its results are still to be
+saved. The command also goes on if its output goes to a full disk, but reports this and fails.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ def all_was_written() -> bool:
 
 
 def _write_no_more(err: bool, error: OSError) -> None:
-    """Let standard output, or standard error, lead nowhere: its reader has gone, or it takes nothing."""
+    """Redirect standard output, or standard error, to nowhere: its reader has gone, or it cannot be written."""
     stream = sys.stderr if err else sys.stdout
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
@@ -55,14 +54,14 @@ def _write_no_more(err: bool, error: OSError) -> None:
 
 
 class Terminal(Console):
-    """A console of rich whose texts are printable and hold no markup; styles are given apart from them.
+    """A console of rich whose texts are printable and hold no markup; styles are given separately.
 
     Parameters
     ----------
     spelling : callable
-        What it shows of messages: see `messages.Spelling`.
+        Spelling of messages: see `messages.Spelling`.
     options
-        Those of rich.
+        Options of rich's console.
     """
 
     def __init__(self, spelling: Spelling = typed, **options: Any) -> None:
@@ -71,15 +70,15 @@ class Terminal(Console):
         super().__init__(**{**plain, **options})
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Return a text as it is shown; everything that is printed as a string passes here."""
+        """Return a string in its printable form; every string to print passes through this method."""
         return super().render_str(printable(self.spelling(text)), **options)
 
     def on_broken_pipe(self) -> None:
-        """Go on without a reader."""
+        """Continue without a reader."""
         self._write_no_more(BrokenPipeError())
 
     def __exit__(self, *error: Any) -> None:
-        """Write what was printed; every way to print ends here."""
+        """Write text to the terminal; all printing ends in this method."""
         try:
             super().__exit__(*error)
         except OSError as problem:
@@ -91,7 +90,7 @@ class Terminal(Console):
 
 
 def wide_terminal(spelling: Spelling = typed) -> Terminal:
-    """Return a console whose tables are as wide as they need to be where they go to a pipe, which has no width."""
+    """Return a console whose tables take the width they need if they go to a pipe, which has no width."""
     console = Terminal(spelling)
     if not console.is_terminal:
         console.width = _PIPE_WIDTH
@@ -99,5 +98,5 @@ def wide_terminal(spelling: Spelling = typed) -> Terminal:
 
 
 def note(text: str) -> None:
-    """Say what takes a while, beside what the command says."""
+    """Announce a slow action, apart from the command's own output."""
     say(text, err=True)

@@ -1,6 +1,6 @@
-"""Units as products of SI symbols: what FMUs declare, what scenes and CF write, and how people read them.
+"""Units as products of SI symbols: declared by FMUs, written by scenes and CF, and read by people.
 
-What instruments write (`g`, `lbf`, `mV`) is not read here: `analysis.recording.units` makes SI of it.
+Units of instruments (`g`, `lbf`, `mV`) are not read here: `analysis.recording.units` converts them to SI.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 
 from vibroimpact.fmus.errors import UsageError
 
-#: FMI's base units; rad is one of them, so that angles are told from plain numbers.
+#: FMI's base units; rad is one of them, which distinguishes angles from plain numbers.
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-#: Symbols of the SI without a factor, and their exponents of the base units.
+#: SI symbols without a factor, and their exponents of the base units.
 SYMBOLS: Mapping[str, Mapping[str, int]] = {
     **{base: {base: 1} for base in BASE_UNITS},
     "N": {"kg": 1, "m": 1, "s": -2},
@@ -33,7 +33,7 @@ SYMBOLS: Mapping[str, Mapping[str, int]] = {
 }
 CELSIUS = "degree_Celsius"
 ZERO_CELSIUS = 273.15
-#: Relative difference below which two factors are one: descriptions write pi / 180 in decimals.
+#: Relative difference below which two factors count as equal: descriptions write pi / 180 in decimals.
 FACTOR_TOLERANCE = 1e-9
 
 _SCALED = {"g": ("kg", 1e-3), "deg": ("rad", math.pi / 180.0), "min": ("s", 60.0), "h": ("s", 3600.0)}
@@ -53,9 +53,9 @@ class Unit:
     powers : mapping of str to int
         Powers of `SYMBOLS`, as written.
     factor, offset : float
-        Size of the unit in base units, and where its zero is.
+        Size of the unit in base units, and the position of its zero in base units.
     label : str
-        As whoever declares it writes it; empty for one that has no name of its own.
+        Name as declared; empty for a unit without a name.
     """
 
     powers: Mapping[str, int] = field(default_factory=dict)
@@ -65,7 +65,7 @@ class Unit:
 
     @property
     def name(self) -> str:
-        """Its label, or as model descriptions write it: `m/s2`, `W/(m2.K)`, `9.80665 m/s2`; empty for a number."""
+        """The label, or the unit as in model descriptions: `m/s2`, `W/(m2.K)`, `9.80665 m/s2`; empty for a number."""
         if self.label:
             return self.label
         if self.offset:
@@ -75,13 +75,13 @@ class Unit:
 
     @property
     def cf(self) -> str:
-        """As CF writes it: `N s m-1`; `1` for a pure number."""
+        """Name in CF's form: `N s m-1`; `1` for a pure number."""
         text = " ".join(_written(symbol, power) for symbol, power in self.powers.items()) or "1"
         return text if self.factor == 1.0 else f"{self.factor:.15g} {text}"
 
     @property
     def exponents(self) -> dict[str, int]:
-        """Exponents of FMI's base units, those of 0 left out."""
+        """Nonzero exponents of FMI's base units."""
         sums: dict[str, int] = {}
         for symbol, power in self.powers.items():
             for base, exponent in SYMBOLS[symbol].items():
@@ -90,12 +90,12 @@ class Unit:
 
     @property
     def per_second(self) -> Unit:
-        """The unit of a slope over time; a pure number's has none either."""
+        """Unit of a slope over time; none for the slope of a pure number."""
         return _combined(self, Unit({"s": 1}), -1) if self.name else self
 
     @property
     def difference(self) -> Unit:
-        """The unit of a difference: of temperatures in degrees Celsius it is the kelvin."""
+        """Unit of a difference; for temperatures in degrees Celsius it is the kelvin."""
         return Unit(self.powers, self.factor)
 
 
@@ -105,10 +105,10 @@ def declared_unit(label: str, exponents: Mapping[str, int], factor: float = 1.0,
 
 
 def parse_unit(text: str) -> Unit | None:
-    """Read a unit written as a product of SI symbols, as FMI writes it; None when it is not one.
+    """Return a unit from a product of SI symbols in FMI's form; None for any other text.
 
-    Factors are joined by dots, exponents follow their symbol, each slash divides by the one factor or the
-    one parenthesis behind it; `1` is the unit of a plain number. The prefixes n, u, m, c, k, M, G are known.
+    Dots join factors, and exponents follow their symbol. Each slash divides by the factor, or the parenthesis, right
+    behind it. `1` is the unit of a plain number. The prefixes n, u, m, c, k, M, G are known.
 
     Examples
     --------
@@ -133,7 +133,7 @@ def parse_unit(text: str) -> Unit | None:
 
 
 def si_unit(text: str) -> Unit:
-    """Return a unit written as CF writes it (blanks between powers, a factor in front) or as FMI does.
+    """Return a unit from CF's form (blanks between powers, a factor in front) or FMI's form.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def si_unit(text: str) -> Unit:
     Raises
     ------
     UsageError
-        It is no such product.
+        The text is no such product.
 
     Examples
     --------
@@ -163,13 +163,13 @@ def si_unit(text: str) -> Unit:
         raise _unknown(text)
     rest = ".".join(text[0 if number is None else number.end() :].replace(".", " ").split())
     product = parse_unit(rest if rest and rest[0] != "/" else f"1{rest}")
-    if product is None or product.factor != 1.0:  # `g` is gravity in a recording, and a prefix a factor
+    if product is None or product.factor != 1.0:  # `g` is gravity in a recording, and a prefix is a factor
         raise _unknown(text)
     return Unit(product.powers, factor)
 
 
 def agree(one: Unit, other: Unit) -> bool:
-    """Whether a number means the same in both units, whatever their names."""
+    """Whether a number has the same meaning in both units, whatever their names."""
     return (
         one.exponents == other.exponents
         and math.isclose(one.factor, other.factor, rel_tol=FACTOR_TOLERANCE)
@@ -178,14 +178,14 @@ def agree(one: Unit, other: Unit) -> bool:
 
 
 def product_agrees(source: Unit, gain: Unit, target: Unit) -> bool:
-    """Whether source times gain is target; units whose zero is elsewhere (degC) have no products."""
+    """Whether source times gain is target; units with a shifted zero (degC) have no products."""
     if source.offset or target.offset:
         return False
     return agree(_combined(source, gain, 1), target)
 
 
 def gain_unit_between(source: Unit, target: Unit) -> str | None:
-    """Return a unit that a gain from one unit to the other can be written in; None where there is none.
+    """Return a unit for writing the gain from one unit to another; None if there is none.
 
     Examples
     --------
@@ -210,7 +210,7 @@ def _written(symbol: str, power: int) -> str:
 def _quotient(
     powers: Iterable[tuple[str, int]], between: str = ".", written: Callable[[str, int], str] = _written
 ) -> str:
-    """Return powers in one line as FMI writes them, negative ones behind a stroke; empty without any."""
+    """Return powers in one line as FMI writes them, negative ones behind a slash; empty without powers."""
     powers = list(powers)
     above = between.join(written(symbol, power) for symbol, power in powers if power > 0)
     below = [written(symbol, -power) for symbol, power in powers if power < 0]
@@ -270,7 +270,7 @@ _WHOLE = {"1": "-", CELSIUS: "°C"}
 _SIZED = re.compile(r"(?P<factor>\d+(?:\.\d+)?(?:[eE][-+]?\d+)?) (?P<unit>\D.*)")
 _TOKEN = re.compile(r"(?P<name>[A-Za-zµΩ%]+)(?P<power>-?[1-9])?")
 _SHOWN_PREFIXES = {1e-12: "p", 1e-9: "n", 1e-6: "µ", 1e-3: "m", 1e3: "k", 1e6: "M", 1e9: "G"}
-# of what a prefix makes the unit that people use; `g` is gravity here, never a part of a kilogram
+# symbols that form everyday units with a prefix; `g` is gravity here, never a part of a kilogram
 _PREFIXED = frozenset({"m", "s", "N", "Pa", "V", "A", "J", "W", "Hz", "rad"})
 _NAMED = {
     "m": {0.01: "cm", 0.0254: "in", 0.3048: "ft"},
@@ -284,7 +284,7 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def written_unit(cf: str) -> str:
-    """Return a CF unit as people write it; one that has no such form as it is.
+    """Return a CF unit in the form that people write; unchanged if it has no such form.
 
     >>> written_unit("m s-2"), written_unit("9.80665 m s-2"), written_unit("1"), written_unit("V")
     ('m/s²', 'g', '-', 'V')
@@ -304,7 +304,7 @@ def written_unit(cf: str) -> str:
 
 
 def _scaled(factor: float, tokens: list[tuple[str, int]]) -> list[tuple[str, int]] | None:
-    """Return the parts of a unit with a factor in the name of the first; None where no name has it."""
+    """Return the parts of a unit with the factor as a prefix of the first part; None if no prefix fits."""
     (name, power), rest = tokens[0], tokens[1:]
     if factor == 1.0:
         return tokens

@@ -1,5 +1,5 @@
-"""The orchestration service: campaigns that others submit over HTTP, kept and resumed through anything.
+"""The orchestration service: campaigns that others submit over HTTP, kept and resumed after any interruption.
 
-`commands` has `vibroimpact serve`, and the client's `submit`, `status`, `fetch`, `cancel`; `client` is the client of
+`commands` holds `vibroimpact serve`, and the client's `submit`, `status`, `fetch`, `cancel`; `client` is the client in
 Python. The service itself needs the extra `service`.
 """

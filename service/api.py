@@ -26,7 +26,7 @@ from vibroimpact.service.supervisor import Supervisor
 
 
 def application(store: Store, supervisor: Supervisor, shelf: Shelf, sessions: Sessions) -> FastAPI:
-    """Return the application over a store, what runs its jobs, what scenes may name, and the sessions of its page."""
+    """Return the application over a store, its supervisor, the files for scenes, and the sessions of the page."""
     app = FastAPI(
         title="vibroimpact",
         version=versions()["vibroimpact"],
@@ -38,7 +38,7 @@ def application(store: Store, supervisor: Supervisor, shelf: Shelf, sessions: Se
     answer_problems(app)
 
     @app.get("/healthz", response_class=PlainTextResponse, summary="Whether the service answers")
-    async def healthz() -> str:  # without a thread: it answers when all are busy
+    async def healthz() -> str:  # needs no thread, so it answers even when all are busy
         return "ok\n"
 
     @app.get("/metrics", response_class=PlainTextResponse, responses=problems(), summary="For Prometheus")

@@ -1,4 +1,4 @@
-"""Bodies of requests in JSON: few values, so that checking them costs no more than reading them."""
+"""Bodies of requests in JSON, limited to few values, so that checking them costs no more than reading them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
 MOST_VALUES = 1000
-"""Values in a body, those in lists and objects too; the largest requests have some 250. A scene is one text."""
+"""Largest number of values in a body, with those in lists and objects; the largest requests have about 250."""
 _TEXTS = re.compile(r'"(?:[^"\\]|\\.)*+"?+', re.DOTALL)
-"""Texts in JSON, the last one ended or not: nothing is read twice."""
+"""Texts in JSON, the last one perhaps unfinished; no character is matched twice."""
 
 
 class BoundedRequest(Request):
     """A request whose body holds a limited number of values."""
 
     async def json(self) -> Any:
-        """Return the body; HTTPException where it holds more values than any request has."""
+        """Return the body; raise HTTPException if it holds more values than any request needs."""
         if not hasattr(self, "_json"):
             text = (await self.body()).decode("utf-8-sig")
             if not is_small(text):
@@ -45,10 +45,10 @@ def is_small(text: str) -> bool:
 
 
 class BoundedRoute(APIRoute):
-    """A route that reads bounded bodies: without the bound each unknown key becomes a problem, in the event loop."""
+    """A route with bounded bodies: without the bound each unknown key would become a problem, in the event loop."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return what answers a request."""
+        """Return the handler that answers a request."""
         handler = super().get_route_handler()
 
         async def bounded(request: Request) -> Response:

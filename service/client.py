@@ -23,12 +23,12 @@ __all__ = ["RemoteJob", "RemoteRecording", "Service", "ServiceError"]
 URL_VARIABLE, TOKEN_VARIABLE = "VIBROIMPACT_SERVICE", "VIBROIMPACT_TOKEN"
 DEFAULT_URL = "http://127.0.0.1:8737"
 SECONDS = 30.0
-"""For one answer."""
+"""Time limit for one answer, s."""
 BLOCK = 2**20
-"""Of a file that is uploaded, read at a time, byte."""
+"""Number of bytes that are read at a time from an uploaded file."""
 _TOKEN = re.compile(r"[!-~]+")
 UPLOAD_SECONDS = 600.0
-"""For the answer to an upload, which comes when the file is imported, after those before it."""
+"""Time limit for the answer to an upload, s; it comes when this file, and those before it, are imported."""
 
 
 class Service:
@@ -37,17 +37,17 @@ class Service:
     Parameters
     ----------
     url : str, optional
-        By default `$VIBROIMPACT_SERVICE`, else that of the service that runs on the folder, else
+        Address of the service. The default is `$VIBROIMPACT_SERVICE`, else the address in `folder`, else
         `http://127.0.0.1:8737`.
     token : str, optional
-        By default `$VIBROIMPACT_TOKEN`.
+        Token of the service. The default is `$VIBROIMPACT_TOKEN`.
     folder : path, optional
-        Of the service, if it is on this machine: the token and the address are read there.
+        Folder of a service on this machine; token and address are read there.
 
     Raises
     ------
     UsageError
-        There is no token.
+        No token was found.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class Service:
         *,
         folder: str | os.PathLike[str] | None = None,
     ) -> None:
-        import httpx  # of the extra `service`; commands that need no client load it not
+        import httpx  # of the extra `service`; loaded only by commands that need the client
 
         base = url or os.environ.get(URL_VARIABLE) or _url_in(folder) or DEFAULT_URL
         secret = token or _token_in(folder) or os.environ.get(TOKEN_VARIABLE)
@@ -86,7 +86,7 @@ class Service:
         self._base = base
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return the client itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -113,14 +113,14 @@ class Service:
         scene : path
         workers : int, optional
         recordings, score : sequence of str or RemoteRecording
-            Recordings of the service that a scene with `[replay]` replays, and those that are scored alone.
+            Recordings of the service that a scene with `[replay]` replays, and recordings that are only scored.
         fit : str, optional
-            Numbers of the scene to fit, by key, with commas between them.
+            Keys of the scene's numbers to fit, with commas between them.
 
         Raises
         ------
         ServiceError
-            With the problems of the scene.
+            The service refused the scene; `problems` lists its problems.
         UsageError
             The file cannot be read.
         """
@@ -128,13 +128,13 @@ class Service:
             text = Path(scene).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise UsageError(f"{scene}: expected a scene file, got {error}.") from None
-        asked: dict[str, Any] = {"scene": text, "workers": workers}
+        body: dict[str, Any] = {"scene": text, "workers": workers}
         if recordings or score or fit is not None:
-            asked |= {"fit": fit, "recordings": _names(recordings), "score": _names(score)}
-        return self._accepted_job("/campaigns", asked)
+            body |= {"fit": fit, "recordings": _names(recordings), "score": _names(score)}
+        return self._accepted_job("/campaigns", body)
 
     def estimate(self, kind: str, data: RemoteRecording | RemoteJob, **options: Any) -> RemoteJob:
-        """Estimate from a recording of the service, or from what a job of it has computed.
+        """Estimate from a recording of the service, or from the results of one of its jobs.
 
         Parameters
         ----------
@@ -142,7 +142,7 @@ class Service:
             `decay`, `impacts`, `response` or `spikes`.
         data : RemoteRecording or RemoteJob
         **options
-            Those of the command: `channel`, `start`, `stop`, `law`, `drive`, ...
+            Options of the command: `channel`, `start`, `stop`, `law`, `drive`, ...
 
         Examples
         --------
@@ -151,10 +151,10 @@ class Service:
         source = "recording" if isinstance(data, RemoteRecording) else "campaign"
         return self._accepted_job("/estimates", {source: data.id, "estimate": {"kind": kind, **options}})
 
-    def _accepted_job(self, path: str, asked: dict[str, Any]) -> RemoteJob:
-        # one key for all attempts: an answer that is lost on the way starts nothing twice
+    def _accepted_job(self, path: str, body: dict[str, Any]) -> RemoteJob:
+        # one key for all attempts: a lost answer starts nothing twice
         key = {"Idempotency-Key": uuid.uuid4().hex}
-        return RemoteJob(self, self.told("POST", path, json=asked, headers=key))
+        return RemoteJob(self, self.told("POST", path, json=body, headers=key))
 
     def upload_recording(
         self,
@@ -169,20 +169,20 @@ class Service:
         ----------
         path : path
         settings : mapping, optional
-            Of the import, as `import_recording` takes them: `name`, `unit`, `rate`, ...
+            Settings of the import, as `import_recording` takes them: `name`, `unit`, `rate`, ...
         name : str, optional
-            By which scenes name it, with `.nc` in place of its ending; that of the file by default.
+            Name for scenes, with `.nc` in place of its extension; by default the name of the file.
 
         Raises
         ------
         ServiceError
-            It is no recording, or another one has its name.
+            The file is no recording, or another recording has its name.
         """
         parameters = {"name": name or Path(path).name, "settings": json.dumps(dict(settings or {}))}
         return RemoteRecording(self, self._upload("/recordings", path, parameters))
 
     def upload_fmu(self, path: str | os.PathLike[str]) -> str:
-        """Upload an FMU to a service that takes them; return by which name scenes have it."""
+        """Upload an FMU to a service that accepts uploads; return its name for scenes."""
         return str(self._upload("/fmus", path, {"name": Path(path).name})["name"])
 
     def _upload(self, path: str, file: str | os.PathLike[str], parameters: dict[str, str]) -> Any:
@@ -218,7 +218,7 @@ class Service:
         return (RemoteJob(self, one) for one in self._listed("/campaigns"))
 
     def _listed(self, path: str) -> Iterator[dict[str, Any]]:
-        """Yield the items of all pages."""
+        """Yield the items of all pages of a list."""
         cursor: int | None = None
         while True:
             parameters = {} if cursor is None else {"cursor": cursor}
@@ -234,7 +234,7 @@ class Service:
         Raises
         ------
         ServiceError
-            It was refused, or nobody answered.
+            The request was refused, or the service did not answer.
         """
         import httpx
 
@@ -245,28 +245,28 @@ class Service:
         return _accepted(answer)
 
     def told(self, method: str, path: str, **request: Any) -> dict[str, Any]:
-        """Return what the service tells: a JSON object.
+        """Return the service's answer to a request, a JSON object.
 
         Raises
         ------
         ServiceError
-            It was refused, nobody answered, or somebody else.
+            The request was refused, nobody answered, or the answer is not from this service.
         """
         answer = self.ask(method, path, **request)
         try:
-            told = answer.json()
+            content = answer.json()
         except ValueError:
-            told = None
-        if not isinstance(told, dict):
+            content = None
+        if not isinstance(content, dict):
             got = answer.headers.get("Content-Type", "nothing")
             raise ServiceError(
                 f"{self._base}: expected a service of vibroimpact, got another's answer ({got})."
             )
-        return told
+        return content
 
     @contextlib.contextmanager
     def stream(self, path: str, **request: Any) -> Iterator[httpx.Response]:
-        """Open an answer that comes in parts."""
+        """Open an answer that arrives in parts."""
         import httpx
 
         try:
@@ -298,7 +298,7 @@ def _token_in(folder: str | os.PathLike[str] | None) -> str:
 
 
 def _url_in(folder: str | os.PathLike[str] | None) -> str:
-    """Return the address that a service has written into its folder; empty where none runs there."""
+    """Return the address that a running service has written into its folder; empty if none runs there."""
     if folder is None:
         return ""
     path = Path(folder, URL_FILE)
@@ -311,7 +311,7 @@ def _url_in(folder: str | os.PathLike[str] | None) -> str:
 
 
 def _blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
-    """Yield so much of a file, which may grow meanwhile."""
+    """Yield the first `size` bytes of a file in blocks; the file may grow meanwhile."""
     while size > 0 and (block := file.read(min(size, BLOCK))):
         size -= len(block)
         yield block
@@ -321,8 +321,8 @@ def _accepted(answer: httpx.Response) -> httpx.Response:
     if answer.is_success:
         return answer
     try:
-        told = answer.json()
-        detail, problems = str(told["detail"]), told.get("problems")
+        content = answer.json()
+        detail, problems = str(content["detail"]), content.get("problems")
     except (ValueError, KeyError, TypeError):
         detail, problems = f"{answer.status_code} {answer.reason_phrase}", None
     raise ServiceError(detail, answer.status_code, problems)

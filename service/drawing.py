@@ -1,4 +1,4 @@
-"""Any file of the service as a picture."""
+"""Figures of any file of the service."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from vibroimpact.service.problems import ProblemError
 MEDIA = {"png": "image/png", "svg": "image/svg+xml"}
 """Media types by format."""
 DRAWN: dict[str, Any] = {"content": {media: {} for media in MEDIA.values()}}
-"""How a route is described that draws."""
+"""OpenAPI description of the answers of a route that draws."""
 
 
 def drawn(path: Path, file_format: str, kind: str = "auto", run: int | None = None) -> bytes:
-    """Return the figure of a dataset, a recording or an estimate; 422 where it does not hold what is asked for."""
+    """Return the figure of a dataset, a recording or an estimate; answer 422 if the file does not hold the request."""
     try:
         buffer = io.BytesIO()
         with READING, opened_file(path) as found:

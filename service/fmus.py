@@ -1,4 +1,4 @@
-"""The FMUs that scenes may name: those of the package, and those that were uploaded into the folder of the service."""
+"""The FMUs that scenes may name: those of the package, and those uploaded into the folder of the service."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from vibroimpact.fmus.packaging.archive import refuse_broken_description, unpack
 from vibroimpact.service.recordings import refuse_device
 
 DESCRIPTION_SECONDS = 3.0
-"""Processor time of reading a description, s, as scenes of the service do: one that takes more is not taken."""
+"""Limit of the processor time for reading a description, s; an FMU that takes longer is refused."""
 MOST_FMUS = 100
-"""FMUs that a service keeps."""
+"""Largest number of FMUs that a service keeps."""
 NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.+\-]{0,99}\.fmu$"
-"""What an uploaded FMU may be called: the same on every system, never a path, nor the name of a shipped component."""
+"""Valid name of an uploaded FMU: the same on every system, never a path, nor the name of a shipped component."""
 
 
 class FmuStore:
-    """The FMUs of the folder of a service, `fmus` in it, made when absent.
+    """The FMUs in the folder `fmus` of a service, which is made when absent.
 
-    Others may add to it if it takes uploads: an FMU is native code, which runs with the rights of the service.
+    Clients may add FMUs if uploads are allowed: an FMU is native code, which runs with the rights of the service.
     """
 
     def __init__(self, folder: Path, takes_uploads: bool) -> None:
         self.folder, self.takes_uploads = folder, takes_uploads
         self._lock = threading.Lock()
         make_folder(folder)
-        for part in folder.glob(".*"):  # of uploads that a kill has cut off
+        for part in folder.glob(".*"):  # left by uploads that a kill interrupted
             part.unlink()
 
     def names(self) -> list[str]:
-        """Return the names of the FMUs that are there."""
+        """Return the names of the present FMUs."""
         return sorted(path.name for path in self.folder.glob("*.fmu"))
 
     def find(self, name: str) -> Path | None:
-        """Return the file of an FMU; None where there is none of this name."""
+        """Return the file of an FMU; None for an unknown name."""
         return self.folder / name if name in self.names() else None
 
     def add(self, file: Path, name: str) -> Path:
-        """Take an FMU that was uploaded: moved to its place once its archive and its description are in order.
+        """Accept an uploaded FMU: move it to its place once its archive and its description are valid.
 
-        Nothing of it is loaded, and its description is read by a process of its own. UsageError: it is no FMU, there
-        are too many, or another one has its name.
+        Its code is not loaded, and a separate process reads its description. Raise UsageError if it is no FMU, if there
+        are too many, or if another FMU has its name.
         """
         refuse_device(name)
         try:

@@ -1,4 +1,4 @@
-"""Names by which the service may be asked: a page of another name that leads here (DNS rebinding) gets no answer."""
+"""Host names of the service: a page under another name that leads here (DNS rebinding) gets no answer."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _PORT = re.compile(r":[0-9]{0,5}$")
 
 
 class Hosts:
-    """The hosts of one service: the address on which it listens, `localhost`, and names by which others reach it.
+    """The hosts of one service: its listening address, `localhost`, and the given names.
 
-    What is neither a name nor an address raises UsageError.
+    Raise UsageError for a text that is neither a name nor an address.
 
     >>> hosts = Hosts("127.0.0.1", ["lab.example"])
     >>> hosts.why_not(b"127.0.0.1:8737", "127.0.0.1"), hosts.why_not(b"LAB.example", "127.0.0.1")
@@ -28,21 +28,21 @@ class Hosts:
 
     def __init__(self, address: str, names: Sequence[str] = ()) -> None:
         given = [name.strip("[]").rstrip(".").lower() for name in names]
-        for name, said in zip(given, names, strict=True):
+        for name, text in zip(given, names, strict=True):
             if not _NAME.fullmatch(name) and _address(name) is None:
                 raise UsageError(
                     message(
                         Argument("allow_host"),
-                        f": expected a name such as lab.example, without port, got {said!r}.",
+                        f": expected a name such as lab.example, without port, got {text!r}.",
                     )
                 )
         self._names = sorted({*given, LOCAL, *([] if _is_any(address) else [address.lower()])})
 
     def why_not(self, host: bytes | None, served: str) -> str:
-        """Return why a request is refused that names a host; empty where it is taken.
+        """Return the reason to refuse a request for a host; empty if it is accepted.
 
-        Browsers always send the header, and only they can be misled. `served` is the address of this machine that the
-        connection came to.
+        Browsers always send the header, and only browsers can be misled. `served` is the address of this machine at
+        which the connection arrived.
         """
         if host is None:
             return ""
@@ -66,6 +66,6 @@ def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 
 def _is_any(address: str) -> bool:
-    """Return whether a service on an address listens on all of the machine."""
+    """Return whether a service with this address listens on all addresses of the machine."""
     found = _address(address)
     return found is not None and found.is_unspecified

@@ -1,7 +1,6 @@
-"""What the process does that imports one file.
+"""The process that imports one uploaded file.
 
-What a stranger has uploaded is read here, where a library that crashes, hangs or fills the memory takes nothing else
-with it.
+It reads untrusted files, and a library that crashes, hangs or fills the memory takes nothing else with it.
 """
 
 from __future__ import annotations
@@ -19,18 +18,18 @@ from vibroimpact.service.memory import import_memory
 from vibroimpact.service.passing import FULL
 
 
-def limit_memory(wanted: int) -> None:
+def limit_memory(size: int) -> None:
     """Let allocations beyond an address space (byte) fail."""
     if sys.platform == "linux":
         import resource
 
         _, most = resource.getrlimit(resource.RLIMIT_AS)
-        wanted = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
-        resource.setrlimit(resource.RLIMIT_AS, (wanted, most))
+        size = size if most == resource.RLIM_INFINITY else min(size, most)
+        resource.setrlimit(resource.RLIMIT_AS, (size, most))
 
 
 def contents(recording: Recording) -> list[dict[str, Any]]:
-    """Return what is in a recording, for its list."""
+    """Return a description of a recording's channels."""
     channels = [
         {"name": one.name, "units": one.unit, "samples": len(one.values)}
         for one in recording.channels.values()
@@ -40,9 +39,9 @@ def contents(recording: Recording) -> list[dict[str, Any]]:
 
 
 def answer(file: str, target: str, settings: str) -> dict[str, Any]:
-    """Import a file that was uploaded, with settings in JSON, and write its recording to the target.
+    """Import an uploaded file, with settings in JSON, and write its recording to the target.
 
-    The answer has the `channels` of the recording, why it `failed`, or the error of a disk that is `full`.
+    The answer has the `channels` of the recording, the reason why it `failed`, or the error of a `full` disk.
     """
     path = Path(file)
     memory = import_memory(machine_memory())
@@ -51,7 +50,7 @@ def answer(file: str, target: str, settings: str) -> dict[str, Any]:
         recording = import_recording(path, json.loads(settings))
         write_recording(recording, Path(target))
     except VibroimpactError as error:
-        return {"failed": str(error).replace(f"{path.parent}/", "")}  # its folder is the service's own matter
+        return {"failed": str(error).replace(f"{path.parent}/", "")}  # hide the service's own folder
     except MemoryError:
         gib = memory / 2**30
         return {"failed": f"{path.name}: expected a recording, got more than fits into {gib:.0f} GiB."}

@@ -1,7 +1,7 @@
 """The process that runs one job: `python -m vibroimpact.service.job_process FOLDER WORK`, WORK as `Work` writes it.
 
-What it makes is what the command line makes, by the same functions. It says how far it is in lines of JSON on its
-standard output, and ends when its standard input does: then the service is gone, and another will start it again.
+It makes the same results as the command line, by the same functions. It reports its progress in lines of JSON on its
+standard output. It ends when its standard input does: then the service is gone, and another will restart the job.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
 from vibroimpact.service.passing import FULL, SHORT
 
-SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
-"""Seconds between two lines of progress, at least, and part of all points: each becomes an event that is kept."""
+REPORT_INTERVAL, REPORT_SHARE = 0.25, 1.0 / 500.0
+"""Least interval between two reports of progress, s, and least share of the points: each report becomes an event."""
 INTERRUPTED, LATER = 130, 75
-"""Exit codes of a job that was interrupted in good order, and of one that cannot go on now and may later."""
+"""Exit codes of a job that was interrupted in good order, and of a job that cannot go on now but may later."""
 TRIAL_BYTES = 2**16
-"""What must fit on a disk that is not full."""
+"""Bytes that must fit on a disk for it to count as not full."""
 CONNECT_SECONDS = 2.0
-"""How long a scheduler may take to take a connection."""
+"""Time limit for a scheduler to accept a connection, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a job's process is to do."""
+    """Task of a job's process."""
 
     kind: str
     """`campaign`, `run`, `replay` or `estimate`."""
@@ -51,48 +51,48 @@ class Work:
     scheduler: str | None = None
     """Address of a Dask scheduler to use instead."""
     options: dict[str, Any] = field(default_factory=dict)
-    """Of a replay `fit` and `score`, of an estimate what `estimates.estimate` takes."""
+    """Options: `fit` and `score` of a replay, or the options of `estimates.estimate`."""
 
     def written(self) -> str:
-        """Return it as one word of a command line."""
+        """Return the task as one word of a command line."""
         return json.dumps(asdict(self))
 
 
 def say(**what: Any) -> None:
-    """Tell the service something: one line of JSON on standard output."""
+    """Send a message to the service: one line of JSON on standard output."""
     sys.stdout.write(json.dumps(what) + "\n")
     sys.stdout.flush()
 
 
-class Told(Progress):
-    """Tells the service how many points are done."""
+class ReportedProgress(Progress):
+    """Progress that is reported to the service."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._last, self._told = 0.0, 0
+        self._last, self._reported = 0.0, 0
 
     def begin(self, total: int, done: int, said: str = "") -> None:
-        """Say it at once."""
+        """Report the totals at once."""
         super().begin(total, done, said)
-        self._told = done
+        self._reported = done
         say(total=total, done=done)
 
     def advance(self, points: int) -> None:
-        """Say it now and then, and at the end."""
+        """Report at intervals, and at the end."""
         super().advance(points)
-        news = self._done - self._told >= SAID_PART * self._total
-        if (news and time.monotonic() - self._last >= SAID_EVERY) or self._done == self._total:
-            self._last, self._told = time.monotonic(), self._done
+        news = self._done - self._reported >= REPORT_SHARE * self._total
+        if (news and time.monotonic() - self._last >= REPORT_INTERVAL) or self._done == self._total:
+            self._last, self._reported = time.monotonic(), self._done
             say(total=self._total, done=self._done)
 
     def note(self, text: str) -> None:
-        """Pass it on."""
+        """Pass a note on."""
         say(note=text)
 
 
 def run(folder: Path, work: Work) -> None:
     """Do the work of a job in its folder."""
-    progress = Told()
+    progress = ReportedProgress()
     if work.kind == "estimate":
         from vibroimpact.service.requests import estimate
 
@@ -120,7 +120,7 @@ def run(folder: Path, work: Work) -> None:
 
 
 def _replay(scene: Scene, folder: Path, fit: str | None = None, score: list[str] | None = None) -> None:
-    """Replay the recordings of a scene, and fit numbers of it, into `replay.nc`; the fitted scene beside it."""
+    """Replay the recordings of a scene, and fit numbers of it, into `replay.nc`; write the fitted scene next to it."""
     from vibroimpact.fmus.terminal import Terminal
     from vibroimpact.orchestrator.commands.replay import print_replays
     from vibroimpact.orchestrator.replay.output import fitted_scene_text
@@ -155,13 +155,13 @@ def main(arguments: list[str]) -> int:
             return LATER
         if isinstance(error, OSError):
             raise
-        say(failed=str(error).replace(f"{folder}/", ""))  # where the service lies is its own matter
+        say(failed=str(error).replace(f"{folder}/", ""))  # hide the service's own folder
         return error.exit_code
     return 0
 
 
 def _passing(error: Exception, folder: Path, scheduler: str | None) -> str:
-    """Return in words what hinders a job that may go on later; empty where the job itself is at fault."""
+    """Return in words the temporary cause that stops a job; empty if the job itself is at fault."""
     if _is_full(error, folder):
         return "waits for room on the disk"
     if any(isinstance(one, OSError) and one.errno in SHORT for one in _causes(error)):
@@ -174,14 +174,14 @@ def _passing(error: Exception, folder: Path, scheduler: str | None) -> str:
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error, and what has led to it."""
+    """Yield an error and its causes."""
     while error is not None:
         yield error
         error = error.__cause__ or error.__context__
 
 
 def _is_full(error: BaseException, folder: Path) -> bool:
-    """Return whether the disk is full, as the error says or as a trial shows: errors of workers come without causes."""
+    """Return whether the disk is full, by the error or by a trial, since errors of workers arrive without causes."""
     if any(isinstance(one, OSError) and one.errno in FULL for one in _causes(error)):
         return True
     try:

@@ -1,4 +1,4 @@
-"""What has landed of a campaign: a variable of all its points, from its parts while it runs, then from its dataset."""
+"""Finished points of a campaign: one variable of all points, from its parts while it runs, then from its dataset."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.service.run_classes import ClassColumns, can_be_classified
 
 READING = threading.Lock()
-"""Held while a file is read or drawn: neither the library of NetCDF nor the style of a page is made for threads."""
+"""Lock for reading or drawing a file: neither the NetCDF library nor the page's style is safe for threads."""
 RANGE = "displacement_range"
-"""Not in a file: the largest displacement of a run less the smallest."""
+"""Derived variable: the largest displacement of a run minus the smallest."""
 RANGE_ENDS = ("displacement_max", "displacement_min")
 LARGEST_IMPACT = "largest_impact_velocity"
-"""Not in a file: the largest impact velocity of a run, NaN without an impact."""
+"""Derived variable: the largest impact velocity of a run, NaN without an impact."""
 MEAN_IMPACTS = "mean_impacts_per_period"
-"""Not in a file: the mean number of impacts in a forcing period of a run, NaN without an impact."""
+"""Derived variable: the mean number of impacts in a forcing period of a run, NaN without an impact."""
 CLASS = "class"
-"""Not in a file: the class of a run, as `vibroimpact classify` tells it."""
+"""Derived variable: the class of a run, as `vibroimpact classify` names it."""
 ALONG = ("period", "impact", "stick", "comparison", "interface")
 """Dimensions, besides that of runs, whose values are shown run by run."""
 _NO_VALUES = ("run_index", "direction", "message", "final_state", "connection", "compared")
 MOST_CACHED = 2**27
-"""Of what was read, kept in memory, byte."""
+"""Largest size of the cache of read values, byte."""
 FAILURE_BYTES = 512
-"""Memory that a failure takes, about."""
+"""Estimated memory of a failure, byte."""
 Found = TypeVar("Found")
 Later: TypeAlias = Callable[[], Found]
-"""The rest of an answer, which needs no file any more."""
+"""The rest of an answer, which does not need the file any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,33 +51,33 @@ class Quantity:
     label: str
     units: str
     along: str = ""
-    """The dimension besides that of runs, or that a swept parameter shares with those moving with it; or empty."""
+    """Second dimension of a variable, or dimension that a swept parameter shares with others; or empty."""
 
 
 @dataclass(frozen=True, slots=True)
 class Landed:
-    """One variable of some runs; a row is a value, so a run has several where it has several periods or impacts."""
+    """One variable of some runs, a value per row: a run with several periods or impacts has several rows."""
 
     quantities: tuple[Quantity, ...]
-    """All that could have been asked for."""
+    """All variables that can be requested."""
     axes: tuple[Quantity, ...]
     """The swept parameters, in the order of the scene."""
     runs: NDArray[np.int64]
-    """Index of each run in its campaign, shape (run,), as directions and outcomes."""
+    """Index of each run in its campaign, shape (run,); directions and outcomes have the same shape."""
     directions: NDArray[np.int8]
     outcomes: NDArray[np.int8]
     coordinates: NDArray[np.float64]
-    """Shape (axis, run)."""
+    """Values of the swept parameters, shape (axis, run)."""
     owners: NDArray[np.int64]
-    """Which of the runs a row belongs to, by its place, shape (row,)."""
+    """Place of the run that each row belongs to, shape (row,)."""
     values: NDArray[np.float64]
-    """Shape (row,)."""
+    """Values of the variable, shape (row,)."""
     is_class: bool = False
     """Whether the values are codes of classes (`run_classes.ClassColumns.codes`)."""
 
     @property
     def size(self) -> int:
-        """Bytes in memory."""
+        """Size in memory, byte."""
         arrays = (
             self.runs,
             self.directions,
@@ -91,7 +91,7 @@ class Landed:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A run that did not come to its end."""
+    """A run that did not reach its end."""
 
     run: int
     outcome: int
@@ -100,7 +100,7 @@ class Failure:
 
 
 class LandedReader:
-    """Reads what has landed, and remembers what it found last in each file.
+    """Reader of finished points, with a cache of the last answers by file.
 
     >>> LandedReader().read([Path("campaign/dataset.nc")], "displacement_range")     # doctest: +SKIP
     """
@@ -109,9 +109,9 @@ class LandedReader:
         self._known: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
 
     def read(self, files: Sequence[Path], variable: str) -> Landed | None:
-        """Return a variable from files of the same campaign; None where there are no files yet.
+        """Return a variable from files of the same campaign; None if there are no files yet.
 
-        An unknown variable raises KeyError, a damaged file DatasetError.
+        Raise KeyError for an unknown variable, DatasetError for a damaged file.
         """
 
         def piece(file: netCDF4.Dataset) -> Later[tuple[Landed | None, int]]:
@@ -132,7 +132,7 @@ class LandedReader:
     def failures(self, files: Sequence[Path], outcomes: Sequence[int]) -> list[Failure]:
         """Return the runs of a campaign with one of these outcomes, in the order of their index.
 
-        A damaged file raises DatasetError.
+        Raise DatasetError for a damaged file.
         """
 
         def failed(file: netCDF4.Dataset) -> Later[tuple[list[Failure], int]]:
@@ -148,7 +148,7 @@ class LandedReader:
         question: Hashable,
         read: Callable[[netCDF4.Dataset], Later[tuple[Found, int]]],
     ) -> list[Found]:
-        """Return the answer of each file that is still there; `read` also gives the bytes that an answer takes."""
+        """Return the answer for each file that still exists; `read` also returns the size of an answer in bytes."""
         answers = []
         for path in files:
             try:
@@ -156,7 +156,7 @@ class LandedReader:
             except (FileNotFoundError, DatasetError):
                 if path.exists():
                     raise
-                # the campaign has made one dataset of its parts in the meantime; the next look finds that
+                # the campaign has merged its parts into one dataset meanwhile; the next request will find it
         return answers
 
     def _remembered(
@@ -180,7 +180,7 @@ class LandedReader:
 
 
 def files_of(campaign: Path) -> list[Path]:
-    """Return the files with what has landed of a campaign: its dataset, else its parts in the order of their runs."""
+    """Return the files with finished points of a campaign: its dataset, else its parts in the order of their runs."""
     dataset = campaign / "dataset.nc"
     if dataset.is_file():
         return [dataset]
@@ -228,7 +228,7 @@ def _read(file: netCDF4.Dataset, variable: str) -> Later[Landed | None]:
         variable == CLASS,
     )
     if variable == CLASS:
-        # classes of many runs take seconds, in which other requests read files
+        # classifying many runs takes seconds, in which other requests may read files
         columns = ClassColumns.of(file)
         return lambda: replace(landed, values=columns.codes())
     owners, values = _rows(file, found, runs.size)
@@ -237,7 +237,7 @@ def _read(file: netCDF4.Dataset, variable: str) -> Later[Landed | None]:
 
 def _axis(variable: netCDF4.Variable[Any]) -> Quantity:
     along = str(getattr(variable, SWEPT_ALONG, ""))
-    # points that are no grid stand for two parameters
+    # scattered points have two parameters without a common grid
     return replace(_quantity(variable), along="" if along == SCATTERED else along)
 
 
@@ -270,32 +270,32 @@ def _quantity(variable: netCDF4.Variable[Any]) -> Quantity:
 
 
 def _rows(
-    file: netCDF4.Dataset, asked: Quantity, count: int
+    file: netCDF4.Dataset, quantity: Quantity, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return of each value of a variable the run that it belongs to, and the value."""
+    """Return the run of each value of a variable, and the values."""
     places = np.arange(count, dtype=np.int64)
-    if asked.name == RANGE:
+    if quantity.name == RANGE:
         high, low = (file[name][:] for name in RANGE_ENDS)
         empty = np.isnan(high).all(axis=1)
         largest = np.where(empty, np.nan, np.max(high, axis=1, initial=-np.inf, where=~np.isnan(high)))
         smallest = np.where(empty, np.nan, np.min(low, axis=1, initial=np.inf, where=~np.isnan(low)))
         return places, largest - smallest
-    if asked.name == LARGEST_IMPACT:
+    if quantity.name == LARGEST_IMPACT:
         largest = np.full(count, -np.inf)
         hit = np.repeat(places, file["impact_count"][:])
         np.fmax.at(largest, hit, np.asarray(file["impact_velocity"][:], dtype=np.float64))
         return places, np.where(np.isfinite(largest), largest, np.nan)
-    if asked.name == MEAN_IMPACTS:
+    if quantity.name == MEAN_IMPACTS:
         each = np.asarray(file["impacts_per_period"][:], dtype=np.float64)
         there = ~np.isnan(each)
         mean = np.sum(each, axis=1, where=there) / np.maximum(there.sum(axis=1), 1)
         return places, np.where(mean > 0.0, mean, np.nan)
-    variable = file[asked.name]
+    variable = file[quantity.name]
     values = np.asarray(variable[...], dtype=np.float64)
     if variable.dimensions[0] == "run":
         width = 1 if values.ndim == 1 else values.shape[1]
         return np.repeat(places, width), values.reshape(-1)
-    counts = file[f"{asked.along}_count"][:]
+    counts = file[f"{quantity.along}_count"][:]
     return np.repeat(places, counts), values
 
 

@@ -1,4 +1,4 @@
-"""What the service says of itself on its standard error: lines of JSON, with the job that they are about."""
+"""Log of the service on its standard error: lines of JSON, each with its job."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import time
 from typing import Any
 
 FACTS = ("job", "state", "why", "method", "path", "status", "seconds", "client", "left_out")
-"""What a line may have beside its time, level and event; headers and queries, where secrets would be, are not."""
+"""Keys of a line besides its time, level and event; headers and queries, which may hold secrets, are excluded."""
 
 MOST_ALIKE = 20
-"""Lines alike in `ALIKE_SECONDS`, above which more are counted only: strangers cause them, as many as they like."""
+"""Number of similar lines in `ALIKE_SECONDS` above which more are only counted: clients can cause any number."""
 ALIKE_SECONDS = 60.0
 _BEGINNING = 40
-"""Characters by which a message of a library is known again."""
+"""Number of characters that identify a message of a library."""
 
 
-class _Seldom(logging.Filter):
-    """Lets a few lines that are alike pass, and says in the next one how many were left out.
+class _RepeatFilter(logging.Filter):
+    """Filter that passes a few similar lines, and adds the number of omitted ones to the next.
 
-    The service's own lines pass always, but for those with `alike`, which says what they are alike in.
+    The service's own lines always pass, except those with `alike`, which names their kind.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class _Seldom(logging.Filter):
 
 
 class _Lines(logging.Formatter):
-    """Writes a record as one line of JSON.
+    """Formatter of a record as one line of JSON.
 
     >>> record = logging.makeLogRecord({"msg": "job", "created": 0.0, "levelname": "INFO", "job": "a1"})
     >>> _Lines().format(record)
@@ -52,7 +52,7 @@ class _Lines(logging.Formatter):
     """
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line."""
+        """Return a record as its line."""
         at = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created))
         line: dict[str, Any] = {"at": f"{at}.{int(record.created % 1 * 1000):03d}Z"}
         line |= {"level": record.levelname.lower(), "event": record.getMessage()}
@@ -63,9 +63,9 @@ class _Lines(logging.Formatter):
 
 
 def write_lines() -> None:
-    """Let this process log in lines of JSON: of the service all, of the rest what is wrong."""
+    """Let this process log in lines of JSON: all of the service's messages, warnings of other modules."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Lines())
-    handler.addFilter(_Seldom())
+    handler.addFilter(_RepeatFilter())
     logging.basicConfig(handlers=[handler], level=logging.WARNING, force=True)
     logging.getLogger("vibroimpact.service").setLevel(logging.INFO)

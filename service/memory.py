@@ -1,19 +1,19 @@
-"""How much of the machine's memory the imports of uploaded files may take together."""
+"""Shares of the machine's memory for the imports of uploaded files."""
 
 from __future__ import annotations
 
 MOST_MEMORY = 8 * 2**30
-"""Address space of one import, byte."""
+"""Largest address space of one import, byte."""
 LEAST_MEMORY = 2 * 2**30
-"""Address space that one import has on any machine, byte: the libraries alone map some 1 GiB."""
+"""Least address space of one import on any machine, byte: the libraries alone map about 1 GiB."""
 SHARE = 0.75
-"""Part of the machine's memory that all imports may take together."""
+"""Share of the machine's memory for all imports together."""
 MOST_AT_ONCE = 4
-"""Imports at a time, on a machine of any memory."""
+"""Largest number of simultaneous imports, on a machine of any memory."""
 
 
 def import_memory(machine: int) -> int:
-    """Return the address space of one import on a machine of so much memory, byte.
+    """Return the address space of one import, byte, on a machine with this memory, byte.
 
     >>> [import_memory(gib * 2**30) / 2**30 for gib in (1, 4, 8, 64)]
     [2.0, 3.0, 6.0, 8.0]
@@ -22,7 +22,7 @@ def import_memory(machine: int) -> int:
 
 
 def imports_at_once(machine: int) -> int:
-    """Return how many imports a machine of so much memory (byte) takes at a time.
+    """Return the number of simultaneous imports on a machine with this memory, byte.
 
     >>> [imports_at_once(gib * 2**30) for gib in (1, 8, 16, 24, 64)]
     [1, 1, 1, 2, 4]

@@ -1,4 +1,4 @@
-"""What Prometheus reads: jobs by state, points of those that run, all from the store at the moment of the question."""
+"""Metrics for Prometheus: jobs by state and points of running jobs, read from the store at each request."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CONTENT_TYPE = CONTENT_TYPE_LATEST
 
 
 class _Jobs:
-    """Collects what the store knows."""
+    """Collector of the store's numbers."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -42,7 +42,7 @@ class _Jobs:
 
 
 def _of_each(name: str, meaning: str, values: Mapping[str, float]) -> Metric:
-    """Return a metric that each job has."""
+    """Return a metric with a value for each job."""
     metric = GaugeMetricFamily(f"vibroimpact_{name}", meaning, labels=["job"])
     for job, value in values.items():
         metric.add_metric([job], value)
@@ -50,7 +50,7 @@ def _of_each(name: str, meaning: str, values: Mapping[str, float]) -> Metric:
 
 
 def _workers(job: Job) -> int:
-    """Return the processes that a job computes with; with a scheduler, it may be others."""
+    """Return the number of worker processes of a job; a scheduler may have another number."""
     return (job.workers or processor_count()) if job.kind == Kind.campaign else 1
 
 

@@ -1,4 +1,4 @@
-"""The folder of a service, which is its owner's alone: whoever owns it, its token or its database runs code here."""
+"""Owner of a service's folder: whoever owns the folder, its token or its database can run code here."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 from vibroimpact.fmus.errors import UsageError
 
 URL_FILE, TOKEN_FILE = "url", "token"
-"""Where a service says its address while it runs, and its token."""
+"""Files with the address of a running service, and with its token."""
 _RULE = "expected a path of your own"
 _OWN = (".lock", URL_FILE, TOKEN_FILE, "jobs", "recordings", "fmus")
 
 
 def refuse_foreign_folder(folder: Path, database: str) -> None:
-    """Raise UsageError if the folder of a service, which need not exist, or the database in it, is another user's.
+    """Raise UsageError if another user owns a service's folder, which may be absent, or the database in it.
 
-    The service believes what is in its database.
+    The service trusts its database.
     """
     if not os.path.lexists(folder):
         return
@@ -27,7 +27,7 @@ def refuse_foreign_folder(folder: Path, database: str) -> None:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise UsageError where a path, or what it links to, is another user's; an absent one is nobody's."""
+    """Raise UsageError if another user owns a path, or the target of its link; an absent one passes."""
     if not hasattr(os, "geteuid"):
         return  # systems without owners keep the folders of users apart by themselves
     for status_of in (os.lstat, os.stat):

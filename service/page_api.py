@@ -1,4 +1,4 @@
-"""Routes that the page is made of, besides those of every client: its session, slices, points, failures, examples."""
+"""Routes for the page, besides those for every client: session, slices, points, failures, examples."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ DEFAULT_VARIABLES = (
     "variance_accounted_for",
     "final_displacement",
 )
-"""What is shown of a campaign of which nothing is asked: the first that it has values of."""
+"""Default variables to show of a campaign: the first one with values is taken."""
 MOST_ROWS = 50_000
-"""Rows of one slice."""
+"""Largest number of rows in one slice."""
 MOST_FAILURES = 200
-"""Failures on one page of them."""
+"""Number of failures on one page of their list."""
 FAILED = (Outcome.error, Outcome.crash, Outcome.timeout, Outcome.impact_limit)
 MOST_RUN = 2**31 - 1
 
@@ -52,10 +52,10 @@ class QuantityAnswer(BaseModel):
 
 
 class SliceAnswer(BaseModel):
-    """Columns of as many rows: `run`, `direction`, `outcome`, `value`, and one of each axis in `coordinates`.
+    """Columns of equal length: `run`, `direction`, `outcome`, `value`, and one for each axis in `coordinates`.
 
-    A map of more than the rows that were asked for has one of `every` values of each axis. Values of the class of runs
-    are places in `classes`, the commonest first. The `along` of an axis is the dimension that it shares with others.
+    A map with more rows than requested is thinned to one of `every` values of each axis. Values of the class of runs
+    are places in `classes`, the most frequent first. The `along` of an axis is a dimension shared with other axes.
     """
 
     state: State
@@ -80,7 +80,7 @@ class SliceAnswer(BaseModel):
 class PointAnswer(BaseModel):
     """One point, simulated again: columns by the name of their variable.
 
-    `stops` has the positions that limit a sampled displacement; `left_out` says what is not in the columns.
+    `stops` has the positions that limit a sampled displacement; `left_out` lists parts missing in the columns.
     """
 
     run: int
@@ -97,7 +97,7 @@ class PointAnswer(BaseModel):
 
 
 class FailureAnswer(BaseModel):
-    """A point that did not come to its end."""
+    """A point that did not reach its end."""
 
     run: int
     outcome: str
@@ -106,7 +106,7 @@ class FailureAnswer(BaseModel):
 
 
 class FailurePage(BaseModel):
-    """Points that did not come to their end, in the order of their index."""
+    """Points that did not reach their end, in the order of their index."""
 
     total: int
     items: list[FailureAnswer]
@@ -114,7 +114,7 @@ class FailurePage(BaseModel):
 
 
 class ExampleAnswer(BaseModel):
-    """A scene to begin with."""
+    """An example scene."""
 
     name: str
     title: str
@@ -143,7 +143,7 @@ def _session(sessions: Sessions) -> APIRouter:
         summary="Begin a session of a browser",
     )
     def begin(request: Request, response: Response) -> None:
-        """Turn the token into a cookie, which the scripts of no page can read."""
+        """Exchange the token for a cookie, which no script of a page can read."""
         if "origin" in request.headers and not is_own_origin(dict(request.scope["headers"])):
             raise ProblemError(HTTPStatus.FORBIDDEN, "Origin: expected the page of this service.")
         response.set_cookie(
@@ -166,7 +166,7 @@ def _session(sessions: Sessions) -> APIRouter:
 
 
 def _results(store: Store, job: Job) -> Path:
-    """Return where the points of a job land: the folder of a campaign, or the dataset of a run."""
+    """Return the place of a job's results: the folder of a campaign, or the dataset of a run."""
     if job.kind not in (Kind.campaign, Kind.run):
         raise ProblemError(
             HTTPStatus.CONFLICT,
@@ -184,7 +184,7 @@ def _files(store: Store, job: Job) -> list[Path]:
 
 
 def _damaged(store: Store, job: Job, error: DatasetError) -> ProblemError:
-    why = str(error).replace(f"{store.folder_of(job.id)}/", "")  # where the service lies is its own matter
+    why = str(error).replace(f"{store.folder_of(job.id)}/", "")  # hide the service's own folder
     return ProblemError(HTTPStatus.CONFLICT, f"{job.id}: expected results that can be read, got: {why}")
 
 
@@ -212,17 +212,17 @@ def _slices(store: Store, reader: LandedReader) -> APIRouter:
     @router.get(
         "/campaigns/{name}/slice",
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
-        summary="One variable of the points that have landed so far",
+        summary="One variable of the finished points",
     )
     def one_slice(
         name: str,
         variable: Annotated[str | None, Query(max_length=200)] = None,
-        # FastAPI copies defaults, and takes a list from the query only where the default is one
-        at: Annotated[list[str], Query(max_length=20, description="NAME:VALUE, the nearest there is")] = [],  # noqa: B006
+        # FastAPI copies defaults, and reads a list from the query only if the default is a list
+        at: Annotated[list[str], Query(max_length=20, description="NAME:VALUE, nearest existing")] = [],  # noqa: B006
         within: Annotated[list[str], Query(max_length=20, description="NAME:LOW:HIGH")] = [],  # noqa: B006
-        most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Rows, at most")] = 5000,
+        most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Largest number of rows")] = 5000,
     ) -> SliceAnswer:
-        """Return columns of at most so many rows, thinned evenly; what is not finite is null."""
+        """Return columns with a limited number of rows, thinned evenly; numbers that are not finite become null."""
         job = known_job(store, name)
         found, landed = landed_of(job, variable)
         try:
@@ -272,14 +272,14 @@ def _points(store: Store, reader: LandedReader) -> APIRouter:
         summary="One point, simulated again with its motion in time",
     )
     def point(name: str, run: Annotated[int, PathPart(ge=0, le=MOST_RUN)]) -> PointAnswer:
-        """Simulate a point of a campaign; on a path it starts where the point before it had ended."""
+        """Simulate a point of a campaign again; on a path it starts from the end state of the point before it."""
         results = _results(store, known_job(store, name))
         return PointAnswer(**simulated_point(store.scene_of(name), results, run))
 
     @router.get(
         "/campaigns/{name}/failures",
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
-        summary="Points that did not come to their end, and why",
+        summary="Points that did not reach their end, and why",
     )
     def failures(
         name: str,
@@ -301,7 +301,7 @@ def _points(store: Store, reader: LandedReader) -> APIRouter:
 def _scenes(shelf: Shelf) -> APIRouter:
     router = APIRouter()
 
-    @router.get("/examples", responses=problems(), summary="Scenes to begin with")
+    @router.get("/examples", responses=problems(), summary="Example scenes")
     def examples() -> list[ExampleAnswer]:
         return _examples(shelf)
 
@@ -316,21 +316,21 @@ def _failure(one: Failure) -> FailureAnswer:
 
 @cache
 def _examples(shelf: Shelf) -> list[ExampleAnswer]:
-    """Return the examples of the project that this service takes, campaigns first."""
+    """Return the project's examples that this service accepts, campaigns first."""
     found = []
     for path in sorted(examples_folder().glob("*.toml")):
         text = path.read_text(encoding="utf-8")
         try:
             scene = taken_scene(text, shelf).scene
         except SceneError:
-            continue  # of an FMU that the package does not bring along
+            continue  # it needs an FMU that the package does not contain
         kind: Literal["campaign", "run"] = "campaign" if scene.sweep else "run"
         found.append(ExampleAnswer(name=path.stem, title=scene.title, kind=kind, scene=text))
     return sorted(found, key=lambda one: one.kind)
 
 
 def examples_folder() -> Path:
-    """Return the folder of the examples: in the package, or in the checkout that an editable install is of."""
+    """Return the folder of the examples: in the package, or in the checkout of an editable install."""
     package = Path(str(files("vibroimpact.service")))
     shipped = package / "examples"
     return shipped if shipped.is_dir() else package.resolve().parent / "examples"

@@ -1,4 +1,4 @@
-"""The static files of the page: open to everybody, since there is nothing in them but the page."""
+"""The static files of the page: open to everybody, since they hold no data."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ POLICY = "; ".join(
         "frame-ancestors 'none'",
     )
 )
-"""What the page may load: its own files alone, and nothing that is written into it."""
+"""Content-Security-Policy: the page may load its own files alone, and no inline scripts or styles."""
 
 
 @cache
 def page_files() -> dict[str, Path]:
-    """Return the files of the page by the path that they are served at."""
+    """Return the files of the page by the path at which they are served."""
     folder = Path(str(files("vibroimpact.service"))) / "page"
     found = {f"/page/{path.name}": path for path in sorted(folder.iterdir()) if path.suffix in TYPES}
     return {"/": folder / INDEX, **found}
 
 
 def serve_page(app: FastAPI) -> None:
-    """Add the files of the page to an application; they are no part of the API that it describes."""
+    """Add the files of the page to an application, outside of its described API."""
     for address, path in page_files().items():
         app.add_api_route(address, _sender(path), methods=["GET"], include_in_schema=False)
 
 
 def _sender(path: Path) -> Callable[[], Awaitable[Response]]:
-    async def send() -> Response:  # without a thread: strangers would hold all of them
-        # a checkout is edited while it is served
+    async def send() -> Response:  # needs no thread: unauthenticated clients could hold all of them
+        # a checkout may be edited while it is served
         headers = {"Content-Security-Policy": POLICY, "Cache-Control": "no-cache"}
         return Response(path.read_bytes(), media_type=TYPES[path.suffix], headers=headers)
 

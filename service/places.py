@@ -1,4 +1,4 @@
-"""Places of the keys of a TOML text, found in one pass over it."""
+"""Lines and columns of the keys of a TOML text, found in one pass over it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _TOKEN = re.compile(
     r"|#[^\n]*+",
     re.DOTALL,
 )
-"""Texts and comments of TOML. Each alternative matches all that it has read, ended or not: nothing is read twice."""
+"""Strings and comments of TOML. Each alternative consumes all that it reads, even unfinished: nothing is read twice."""
 _HEADER = re.compile(r"[ \t]*+(\[\[?)[ \t]*+([^\[\]\s][^\[\]]*+)\]\]?+[ \t\r]*+(?:#|$)")
 _ENTRY = re.compile(r"([ \t]*+)([\w\-.\"']++)[ \t]*+=")
 _LAST_INDEX = re.compile(r"\[\d+\]$")
 
 
 class Places:
-    """The places of the keys of one TOML text.
+    """Lines and columns of the keys of one TOML text.
 
     >>> places = Places("# a mass\\n[body]\\n  mass = -1")
     >>> places.of("body.mass"), places.of("body.stiffness"), places.of("record")
@@ -30,7 +30,7 @@ class Places:
     def __init__(self, text: str) -> None:
         self._places: dict[str, tuple[int, int, str]] = {}
         table, counts = "", dict[str, int]()
-        # a text of several lines holds no keys; TOML ends lines at these characters alone
+        # a string of several lines holds no keys; TOML ends lines at these characters alone
         for number, line in enumerate(_TOKEN.sub(_blank, text.removeprefix(BOM)).split("\n"), 1):
             header, entry = _HEADER.match(line), _ENTRY.match(line)
             if header:
@@ -48,14 +48,14 @@ class Places:
 
         The place of an absent key is that of its nearest table, else (1, 1).
         """
-        wanted = _bare(_LAST_INDEX.sub("", key))
-        full = wanted
+        target = _bare(_LAST_INDEX.sub("", key))
+        full = target
         while full not in self._places:
             full = full[: max(full.rfind("."), full.rfind("["), 0)]
             if not full:
                 return 1, 1
         number, column, line = self._places[full]
-        return number, _within(line, column, wanted[len(full) :])
+        return number, _within(line, column, target[len(full) :])
 
 
 def _within(line: str, column: int, rest: str) -> int:

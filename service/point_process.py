@@ -1,4 +1,4 @@
-"""What the process does that simulates one point again: its answer is the motion in time, its impacts and sections."""
+"""The process that simulates one point again: its answer is the motion in time, its impacts and sections."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from vibroimpact.service.landed import files_of
 from vibroimpact.service.slices import finite
 
 MOST_PERIODS = 20
-"""Periods that are shown, of those that are recorded."""
+"""Largest number of recorded periods to show."""
 PER_PERIOD = 200
-"""Samples in a forcing period."""
+"""Number of samples in a forcing period."""
 MOST_SAMPLES = MOST_PERIODS * PER_PERIOD + 1
-"""Samples that are shown: of so many periods, both ends included."""
+"""Largest number of samples to show: those of `MOST_PERIODS` periods, with both ends."""
 OBSERVED = ("displacement", "velocity")
 
 
 def answer(scene: str, results: str, run: int) -> dict[str, Any]:
-    """Return the motion of one point, by its index, or why it `failed`.
+    """Return the motion of one point, by its index, or the reason why it `failed`.
 
-    Results are the folder of a campaign, or the dataset of a run; in a sweep with a path the point starts where the one
-    before it had ended.
+    Results are the folder of a campaign, or the dataset of a run. In a sweep with a path the point starts from the end
+    state of the point before it.
     """
     try:
         return simulated(Path(scene), Path(results), run)
@@ -81,7 +81,7 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
 
 
 def _as_it_ran(given: Scene, results: Path) -> Scene:
-    """Return the scene with what was found out about it before it ran, without finding it out again."""
+    """Return the scene with the settings that were determined before its run, without determining them again."""
     if given.execution.tolerance is None:
         return given
     if not results.is_dir():
@@ -91,7 +91,7 @@ def _as_it_ran(given: Scene, results: Path) -> Scene:
 
 
 def _place_of(scene: Scene, results: Path, run: int) -> tuple[BranchPoint, Branch]:
-    """Return a point with its branch; of an adaptive sweep the rounds before it say where both are."""
+    """Return a point and its branch; in an adaptive sweep, the earlier rounds determine both."""
     if adaptive_axes(scene):
         branch = Rounds(scene).branch_of(merge_datasets(files_of(results)), run)
     else:
@@ -103,9 +103,9 @@ def _place_of(scene: Scene, results: Path, run: int) -> tuple[BranchPoint, Branc
 
 
 def _start_of(results: Path, branch: Branch, run: int) -> State | None:
-    """Return the state that a point of a path starts from: that of the nearest one before it that came to its end.
+    """Return the start state of a point on a path: the end state of the nearest earlier point that reached its end.
 
-    A point before it that has not landed raises UsageError.
+    Raise UsageError if an earlier point is not computed yet.
     """
     if branch.direction == Direction.independent.name:
         return None
@@ -129,7 +129,7 @@ def _start_of(results: Path, branch: Branch, run: int) -> State | None:
 
 
 def _watched(scene: Scene, place: BranchPoint) -> Scene:
-    """Return a scene that records what is shown: its last periods in time, with its impacts."""
+    """Return a scene that records the data to show: its first recorded periods in time, with the impacts."""
     record = scene.record
     if not scene.is_lone_body:
         return scene
@@ -169,7 +169,7 @@ def _stops(scene: Scene, names: Sequence[str]) -> dict[str, list[float]]:
 
 
 def _left_out(scene: Scene, watched: Scene, record: RunRecord) -> list[str]:
-    """Return what of the run is not shown, a sentence each."""
+    """Return a sentence for each part of the run that is not shown."""
     found = []
     own, shown = scene.record.recorded_periods, watched.record.recorded_periods
     if own and shown and shown < own:
@@ -188,7 +188,7 @@ def _every(samples: int) -> int:
 
 
 def _units(scene: Scene, names: Sequence[str]) -> dict[str, str]:
-    """Return the units of what is shown; those of what components report are theirs alone to know."""
+    """Return the units of the shown variables, except those reported by components, whose units only they know."""
     found = {}
     for name in names:
         if name in RULES:

@@ -1,4 +1,4 @@
-"""One point simulated on demand, in a process with a deadline: what clicks on a diagram show."""
+"""One point simulated on demand, in a process with a deadline, for clicks on a diagram."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.service.problems import ProblemError
 
 DEADLINE = 30.0
-"""Seconds that a point may take."""
+"""Time limit for a point, s."""
 MOST_AT_ONCE = 2
-"""Points that are simulated side by side: campaigns need the processors too."""
+"""Largest number of points simulated at the same time: campaigns need the processors too."""
 _FREE = threading.BoundedSemaphore(MOST_AT_ONCE)
 
 
 def simulated_point(scene: Path, results: Path, run: int) -> dict[str, Any]:
     """Return the motion of one point of a campaign, by its index.
 
-    Results are its folder, or the dataset of a run: where the point before it ended. ProblemError: it took too long,
-    failed, or too many are being simulated.
+    Results are the folder of the campaign, or the dataset of a run; they hold the end state of the point before. Raise
+    ProblemError if the point took too long or failed, or if too many points are being simulated.
     """
     if not _FREE.acquire(blocking=False):
         raise ProblemError(
@@ -31,12 +31,12 @@ def simulated_point(scene: Path, results: Path, run: int) -> dict[str, Any]:
             {"Retry-After": "1"},
         )
     try:
-        said = _answer(scene, results, run)
+        found = _answer(scene, results, run)
     finally:
         _FREE.release()
-    if "failed" in said:
-        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, said["failed"])
-    return said
+    if "failed" in found:
+        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, found["failed"])
+    return found
 
 
 def _answer(scene: Path, results: Path, run: int) -> dict[str, Any]:

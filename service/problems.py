@@ -1,4 +1,4 @@
-"""Answers to what cannot be done: problem details (RFC 9457), one clear text each."""
+"""Answers for refused requests: problem details (RFC 9457), each with one clear text."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _FULL_DATABASE = ("SQLITE_FULL", "SQLITE_IOERR_WRITE", "SQLITE_IOERR_FSYNC", "SQ
 _HELD_DATABASE = ("SQLITE_BUSY", "SQLITE_LOCKED")
 _SHORT_DATABASE = ("SQLITE_CANTOPEN", "SQLITE_NOMEM", "SQLITE_IOERR_NOMEM")
 RETRY_HELD = 2
-"""Seconds after which a client may ask again that found the database held, or the machine short of something."""
+"""Time after which a client may retry, s, if the database was locked or the machine short of a resource."""
 MEDIA_TYPE = "application/problem+json"
 MOST_PROBLEMS = 50
-"""Problems that one answer lists; the client mends these first."""
+"""Largest number of problems in one answer; the client mends these first."""
 MOST_CHARACTERS = 1000
-"""Length of a message, above which its middle is left out: messages repeat what the client sent."""
+"""Length of a message above which its middle is left out: messages quote the client's input."""
 
 
 class ProblemError(Exception):
-    """A request that is refused: the detail says what is wrong and what was expected, `members` are further ones."""
+    """A refused request: the detail says what is wrong and what was expected; `members` are further fields."""
 
     def __init__(
         self, status: HTTPStatus, detail: str, headers: Mapping[str, str] | None = None, **members: Any
@@ -44,7 +44,7 @@ def answer(
 
 
 def problem(status: int, detail: str) -> dict[str, Any]:
-    """Return a problem as it is written."""
+    """Return a problem as its JSON members."""
     return {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
@@ -54,7 +54,7 @@ def problem(status: int, detail: str) -> dict[str, Any]:
 
 
 def shortened(text: str) -> str:
-    """Return a text of at most `MOST_CHARACTERS`: a longer one without its middle.
+    """Return a text of at most `MOST_CHARACTERS`; a longer one loses its middle.
 
     >>> shortened("a" * 600 + "b" * 600) == "a" * 498 + " ... " + "b" * 497
     True
@@ -66,33 +66,33 @@ def shortened(text: str) -> str:
 
 
 def is_held(error: Exception) -> bool:
-    """Return whether an error is that of a database that another program holds."""
+    """Return whether an error means that another program has locked the database."""
     return getattr(error, "sqlite_errorname", "").startswith(_HELD_DATABASE)
 
 
 def is_full(error: Exception) -> bool:
-    """Return whether an error is that of a full disk, under a file or under the database."""
+    """Return whether an error means a full disk, under a file or under the database."""
     if isinstance(error, sqlite3.Error):
         return getattr(error, "sqlite_errorname", "") in _FULL_DATABASE
     return isinstance(error, OSError) and error.errno in FULL
 
 
 def is_short(error: Exception) -> bool:
-    """Return whether an error is that of a process or system without free descriptors or memory."""
+    """Return whether an error means a process or system without free descriptors or memory."""
     if isinstance(error, sqlite3.Error):
         return getattr(error, "sqlite_errorname", "").startswith(_SHORT_DATABASE)
     return isinstance(error, OSError) and error.errno in SHORT
 
 
 def why_later(error: Exception) -> str:
-    """Return what a job waits for that an error hinders; empty where waiting does not help."""
+    """Return the shortage that a job must wait for after an error; empty if waiting does not help."""
     if is_full(error):
         return "waits for room on the disk"
     return "waits for free files and memory of the machine" if is_short(error) else ""
 
 
 def answer_problems(app: FastAPI) -> None:
-    """Let an application answer all of its errors in this form."""
+    """Let an application answer all of its errors as problem details."""
 
     @app.exception_handler(ProblemError)
     def of_ours(_: Request, problem: ProblemError) -> JSONResponse:

@@ -18,13 +18,13 @@ from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.service.store import OUTPUTS, Store
 
 PART = "part-"
-"""Beginning of the name of a file that is being imported."""
+"""Prefix of the name of a file during its import."""
 MOST_RECORDINGS = 1000
-"""Recordings that a service keeps."""
+"""Largest number of recordings that a service keeps."""
 IMPORT_SECONDS = 120.0
-"""For the import of one file, which a damaged one may hold up."""
+"""Time limit for the import of one file, s; a damaged file may hang."""
 NAME = r"^[A-Za-z0-9_][A-Za-z0-9_ .+\-]{0,99}$"
-"""What a file may be called: the same on every system, and never a path."""
+"""Valid name of a file: the same on every system, and never a path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,36 +32,36 @@ class StoredRecording:
     """A recording of the service."""
 
     number: int
-    """In the order of upload, from 1."""
+    """Number in the order of upload, from 1."""
     id: str
     """32 hexadecimal digits."""
     name: str
-    """By which scenes name it: that of the file uploaded, with the ending `.nc`."""
+    """Name for scenes: the name of the uploaded file, with the extension `.nc`."""
     source: str
-    """SHA-256 of the file uploaded, and its import settings."""
+    """SHA-256 of the uploaded file and its import settings."""
     bytes: int
     channels: list[dict[str, Any]]
-    """`name`, `units`, `samples` of each channel; of a train of events `events` in place of `samples`."""
+    """`name`, `units` and `samples` of each channel; a train of events has `events` in place of `samples`."""
     created: float
-    """Seconds since 1970."""
+    """Time of the upload, seconds since 1970."""
 
 
 class RecordingStore:
-    """The recordings of the folder of a store."""
+    """The recordings in the folder of a store."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self.folder = store.folder / "recordings"
         make_folder(self.folder)
-        for path in self.folder.glob(f"{PART}*"):  # of uploads that a kill has cut off
+        for path in self.folder.glob(f"{PART}*"):  # left by uploads that a kill interrupted
             path.unlink()
 
     def path(self, name: str) -> Path:
-        """Return where the file of a recording is, by its id."""
+        """Return the path of a recording's file, by its id."""
         return self.folder / f"{name}.nc"
 
     def file(self, recording: StoredRecording) -> Path:
-        """Return the file of a recording; UsageError where somebody has removed it."""
+        """Return the file of a recording; raise UsageError if it was removed."""
         path = self.path(recording.id)
         if not path.is_file():
             raise UsageError(
@@ -71,14 +71,14 @@ class RecordingStore:
         return path
 
     def find(self, name: str) -> StoredRecording:
-        """Return a recording by its id or its name; an unknown one raises KeyError."""
+        """Return a recording by its id or its name; raise KeyError for an unknown one."""
         rows = self._store.rows(f"SELECT {_COLUMNS} FROM recordings WHERE id = ? OR name = ?", name, name)
         if not rows:
             raise KeyError(name)
         return _recording(rows[0])
 
     def page(self, *, before: int | None = None, most: int = 100) -> list[StoredRecording]:
-        """Return recordings of lower number, the newest first."""
+        """Return recordings with lower numbers than `before`, the newest first."""
         rows = self._store.rows(
             f"SELECT {_COLUMNS} FROM recordings WHERE number < ? ORDER BY number DESC LIMIT ?",
             *(2**62 if before is None else before, most),
@@ -86,10 +86,10 @@ class RecordingStore:
         return [_recording(row) for row in rows]
 
     def add(self, file: Path, source: str, settings: str) -> StoredRecording:
-        """Import a file that was uploaded; the same file with the same name and settings again is the same recording.
+        """Import an uploaded file; the same file with the same name and settings gives the same recording again.
 
-        The file has its given name, in a folder of its own; `source` is the SHA-256 of file and settings (JSON).
-        UsageError: it is no recording, or another one has its name.
+        The file has its given name, in a folder of its own; `source` is the SHA-256 of file and settings (JSON). Raise
+        UsageError if the file is no recording, or if another recording has its name.
         """
         name, known = stored_name(file.name), self._known(stored_name(file.name), source)
         if known is not None:
@@ -110,18 +110,18 @@ class RecordingStore:
             target.unlink(missing_ok=True)
             self.path(identifier).unlink(missing_ok=True)
             raise
-        if there is not None:  # another upload of the same was faster
+        if there is not None:  # another upload of the same file was faster
             target.unlink()
             return there
         return self.find(identifier)
 
     def refuse_more(self) -> None:
-        """Refuse a recording more than there may be."""
+        """Raise an error if the service has its full number of recordings."""
         if self._store.rows("SELECT COUNT(*) FROM recordings")[0][0] >= MOST_RECORDINGS:
             raise UsageError(f"expected fewer than {MOST_RECORDINGS} recordings, got no room. Delete some.")
 
     def delete(self, recording: StoredRecording) -> None:
-        """Forget a recording; jobs that have begun with it keep what they read."""
+        """Delete a recording; jobs that have begun with it keep its data."""
         with self._store.transaction() as database:
             database.execute("DELETE FROM recordings WHERE id = ?", (recording.id,))
         self.path(recording.id).unlink(missing_ok=True)
@@ -140,7 +140,7 @@ class RecordingStore:
 
 
 def refuse_device(name: str) -> None:
-    """Raise UsageError where a name is no file's on Windows."""
+    """Raise UsageError for a name that Windows reserves for a device."""
     if is_device(name):
         raise UsageError(
             f"name: expected a name that files have on every system, got {name!r}, a device on Windows. Choose another."
@@ -148,7 +148,7 @@ def refuse_device(name: str) -> None:
 
 
 def stored_name(name: str) -> str:
-    """Return what a recording is called that was uploaded under a name.
+    """Return the name of the recording for the name of an uploaded file.
 
     >>> stored_name("a0.tdms")
     'a0.nc'
@@ -161,21 +161,21 @@ def stored_name(name: str) -> str:
 
 
 def imported(file: Path, target: Path, settings: str) -> list[dict[str, Any]]:
-    """Import a file in a process that may die or hang; return what its channels are.
+    """Import a file in a process that may die or hang; return the description of its channels.
 
-    UsageError: it is no recording, or its import did not end.
+    Raise UsageError if the file is no recording, or if its import did not end.
     """
     function = "vibroimpact.service.import_process:answer"
     done = call(function, str(file), str(target), settings, seconds=IMPORT_SECONDS, errors="dropped")
-    told = done.answer or {}
-    if "full" in told:
-        raise OSError(*told["full"])
-    if "channels" not in told:
+    reply = done.answer or {}
+    if "full" in reply:
+        raise OSError(*reply["full"])
+    if "channels" not in reply:
         late = f", after {IMPORT_SECONDS:.0f} s" if done.is_late else ""
         end = f"{file.name}: expected a recording, got a file whose import {ending(done.code)}{late}."
-        why = told.get("failed") or end
+        why = reply.get("failed") or end
         raise UsageError(str(why))
-    channels: list[dict[str, Any]] = told["channels"]
+    channels: list[dict[str, Any]] = reply["channels"]
     return channels
 
 

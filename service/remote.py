@@ -1,4 +1,4 @@
-"""What a client holds of a service: jobs and recordings, each asked for again when something is wanted of it."""
+"""Jobs and recordings that a client holds of a service; their methods ask the service again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ENDED = ("done", "failed", "cancelled")
 MOST_RECONNECTS = 20
-"""Attempts in a row to follow a service that does not answer."""
+"""Number of successive attempts to reconnect to a service that does not answer."""
 
 
 class ServiceError(VibroimpactError):
@@ -32,9 +32,9 @@ class ServiceError(VibroimpactError):
     Attributes
     ----------
     status : int
-        Of the answer, as HTTP has them; 0 where there was none.
+        Status code of the HTTP answer; 0 without an answer.
     problems : list of dict
-        Of a scene: `message`, `line`, `column`.
+        Problems of a scene: `message`, `line`, `column`.
     """
 
     def __init__(self, message: str, status: int = 0, problems: list[dict[str, Any]] | None = None) -> None:
@@ -44,16 +44,16 @@ class ServiceError(VibroimpactError):
 
 
 class Connection(Protocol):
-    """What asks a service: a `Service`."""
+    """Interface to a service: a `Service`."""
 
     def ask(self, method: str, path: str, **request: Any) -> httpx.Response:
         """Return the answer to a request."""
 
     def told(self, method: str, path: str, **request: Any) -> dict[str, Any]:
-        """Return what the service tells: a JSON object."""
+        """Return the service's answer to a request, a JSON object."""
 
     def stream(self, path: str, **request: Any) -> AbstractContextManager[httpx.Response]:
-        """Open an answer that comes in parts."""
+        """Open an answer that arrives in parts."""
 
 
 class RemoteJob:
@@ -63,7 +63,7 @@ class RemoteJob:
     ----------
     id : str
     status : dict
-        As the service told it last: `state`, `done`, `total`, `message`, ...
+        Last known status: `state`, `done`, `total`, `message`, ...
     """
 
     def __init__(self, service: Connection, status: dict[str, Any]) -> None:
@@ -71,12 +71,12 @@ class RemoteJob:
         self.id: str = status["id"]
 
     def refresh(self) -> RemoteJob:
-        """Ask the service where the campaign is."""
+        """Update the status from the service."""
         self.status = self._service.told("GET", f"/campaigns/{self.id}")
         return self
 
     def events(self, after: int = 0) -> Iterator[dict[str, Any]]:
-        """Yield all that happens to it until it has ended, each with its `id`, over lost connections too."""
+        """Yield all events of the campaign until it has ended, each with its `id`, across lost connections."""
         failures = 0
         while True:
             try:
@@ -108,12 +108,12 @@ class RemoteJob:
                     event |= json.loads(value)
 
     def wait(self) -> RemoteJob:
-        """Return when it is done.
+        """Wait until the campaign is done.
 
         Raises
         ------
         ServiceError
-            It has failed, or was cancelled.
+            The campaign has failed, or was cancelled.
         """
         for _ in self.events():
             pass
@@ -122,21 +122,21 @@ class RemoteJob:
         return self
 
     def cancel(self) -> RemoteJob:
-        """Cancel it; what it has computed stays."""
+        """Cancel the campaign; its results so far stay."""
         self.status = self._service.told("POST", f"/campaigns/{self.id}/cancel")
         return self
 
     def resume(self) -> RemoteJob:
-        """Let it go on."""
+        """Resume the campaign."""
         self.status = self._service.told("POST", f"/campaigns/{self.id}/resume")
         return self
 
     def fetch(self, path: str | os.PathLike[str]) -> Path:
-        """Write its dataset to a file, whole or not at all."""
+        """Write the campaign's dataset to a file, whole or not at all."""
         return _fetched(self._service, f"/campaigns/{self.id}/dataset", Path(path))
 
     def dataset(self) -> xr.Dataset:
-        """Return its dataset, in memory: of runs, or of what was estimated or replayed."""
+        """Return the campaign's dataset, in memory: runs, or the results of an estimate or a replay."""
         import tempfile
 
         from vibroimpact.analysis.dataset import open_dataset
@@ -147,7 +147,7 @@ class RemoteJob:
             return found.load()
 
     def fitted_scene(self) -> str:
-        """Return the text of its scene with the numbers that a fit has found."""
+        """Return the text of the campaign's scene with the fitted numbers."""
         return self._service.ask("GET", f"/campaigns/{self.id}/scene", params={"fitted": True}).text
 
 
@@ -157,9 +157,9 @@ class RemoteRecording:
     Attributes
     ----------
     id, name : str
-        Scenes name it by either.
+        Both identify the recording in scenes.
     status : dict
-        As the service told it: `bytes`, `channels`, `created` too.
+        Last known status, with `bytes`, `channels`, `created` too.
     """
 
     def __init__(self, service: Connection, status: dict[str, Any]) -> None:
@@ -168,11 +168,11 @@ class RemoteRecording:
         self.name: str = status["name"]
 
     def fetch(self, path: str | os.PathLike[str]) -> Path:
-        """Write it to a file, whole or not at all."""
+        """Write the recording to a file, whole or not at all."""
         return _fetched(self._service, f"/recordings/{self.id}/file", Path(path))
 
     def recording(self) -> Recording:
-        """Return it, in memory."""
+        """Return the recording, in memory."""
         import tempfile
 
         from vibroimpact.analysis.recording import open_recording
@@ -181,7 +181,7 @@ class RemoteRecording:
             return open_recording(self.fetch(Path(folder, self.name)))
 
     def delete(self) -> None:
-        """Let the service forget it; jobs that were submitted with it keep what they read."""
+        """Delete the recording on the service; jobs that were submitted with it keep its data."""
         self._service.ask("DELETE", f"/recordings/{self.id}")
 
 

@@ -23,7 +23,7 @@ ESTIMATES: dict[str, type[Operation]] = {
     "response": EstimateResponse,
     "spikes": Spikes,
 }
-"""Operations that a request can ask for, by its `kind`."""
+"""Operations that a request can name, by its `kind`."""
 
 
 def body_of(kind: str, declared: type[Operation]) -> type[BaseModel]:
@@ -74,12 +74,12 @@ _ESTIMATE: TypeAdapter[BaseModel] = TypeAdapter(Estimate)
 
 
 def estimate(folder: Path, options: dict[str, Any]) -> None:
-    """Estimate in the folder of a job.
+    """Carry out an estimate in the folder of a job.
 
-    The options are `data`, the name of a recording or a dataset in it, and `asked`, an `Estimate`.
+    The options are `data`, the name of a recording or a dataset in the folder, and `asked`, an `Estimate`.
     """
-    asked = _ESTIMATE.validate_python(options["asked"]).model_dump()
-    declared = ESTIMATES[asked["kind"]]
-    given = {field.name: asked[key] for key, field, _ in _offered(declared)}
+    arguments = _ESTIMATE.validate_python(options["asked"]).model_dump()
+    declared = ESTIMATES[arguments["kind"]]
+    given = {field.name: arguments[key] for key, field, _ in _offered(declared)}
     place: dict[str, Any] = {"data": folder / options["data"], "output": folder / OUTPUT, "force": True}
-    declared(**place, **given).carry_out(spelling=str)  # its arguments have the names of Python
+    declared(**place, **given).carry_out(spelling=str)  # the arguments have Python's names

@@ -1,4 +1,4 @@
-"""The class of each run of an open file, as a number that is kept beside other variables, and its name."""
+"""The class of each run of an open file, as a number that is cached like other variables, and its name."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from vibroimpact.analysis.dataset.schema import OrbitClass, Outcome
 
 STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
 _KINDS, _MOST_IMPACTS = 16, 2**24
-"""Numbers of kinds of classes, and of impacts of an orbit, that a code has room for."""
+"""Number of kinds of classes, and of impacts of an orbit, that fit into a code."""
 _MOST_WORK, _EACH = 3e7, 200
-"""Runs times (periods^2 + 200) above which classes are not told: measured, 10 s where all runs are aperiodic."""
+"""Runs times (periods^2 + 200) above which classes are not computed: measured 10 s if all runs are aperiodic."""
 
 
 def can_be_classified(file: netCDF4.Dataset) -> bool:
-    """Whether a file has values of each period that tell the class of a run, and is not too large for it."""
+    """Whether a file has values of each period that determine the class of a run, and is small enough."""
     columns = _columns(file)
     if columns and file.dimensions["run"].size * (file[columns[0]].shape[1] ** 2 + _EACH) > _MOST_WORK:
         return False
@@ -30,19 +30,19 @@ def can_be_classified(file: netCDF4.Dataset) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ClassColumns:
-    """The values of a file that tell the classes of its runs; read at once, classified without the file."""
+    """The values of a file that determine the classes of its runs; the classification does not need the open file."""
 
     states: NDArray[np.float64]
-    """Shape (run, period, state)."""
+    """States at each period, shape (run, period, state)."""
     impacts: NDArray[np.int64] | None
     """Impacts of each period, shape (run, period), where the file has them."""
     outcomes: NDArray[np.int8]
-    """Shape (run,), as sticks."""
+    """Outcomes, shape (run,); sticks have the same shape."""
     sticks: NDArray[np.int64]
 
     @classmethod
     def of(cls, file: netCDF4.Dataset) -> ClassColumns:
-        """Read them from an open file."""
+        """Return the values from an open file."""
         states = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in _columns(file)], axis=-1)
         impacts = file["impacts_per_period"][:] if "impacts_per_period" in file.variables else None
         sticks = file["stick_count"][:] if "stick_count" in file.variables else np.zeros(len(states), int)
@@ -61,7 +61,7 @@ class ClassColumns:
 
 
 def named_classes(codes: NDArray[np.float64]) -> tuple[list[str], NDArray[np.float64]]:
-    """Return the names of the classes that occur, the commonest first, and the place of each code among them."""
+    """Return the names of the occurring classes, the most frequent first, and the place of each code among them."""
     distinct, owner = np.unique(codes, return_inverse=True)
     names = [_name(int(code)) for code in distinct]
     counts: Counter[str] = Counter()

@@ -1,4 +1,4 @@
-"""Scenes that come over the network: what of them the service takes, and where their problems are."""
+"""Scenes from the network: their allowed content, and the places of their problems."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.store import Kind
 
 SOURCE = "scene"
-"""What messages about a submitted scene begin with."""
+"""Beginning of messages about a submitted scene."""
 _SYNTAX = re.compile(rf"{SOURCE}: line (\d{{1,9}})(?:, column (\d{{1,9}}))?: ")
 _KEY = re.compile(rf"{SOURCE}: ([A-Za-z_][\w\-]*(?:\[\d+\])?(?:\.[\w\-\"]+(?:\[\d+\])?)*): ")
 
 
 @dataclass(frozen=True, slots=True)
 class Shelf:
-    """What a scene that was submitted may name: recordings and FMUs of the service."""
+    """The files that a submitted scene may name: recordings and FMUs of the service."""
 
     recordings: RecordingStore
     fmus: FmuStore
@@ -37,27 +37,27 @@ class Shelf:
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A scene that was submitted."""
+    """A submitted scene that was accepted."""
 
     scene: Scene
     text: str
-    """TOML, with the recordings that were named beside it."""
+    """TOML, with the recordings that were named separately."""
     files: dict[str, Path]
-    """The files of the service that it reads, by the names it has for them."""
+    """Files of the service that the scene reads, by their names in the scene."""
 
     @property
     def kind(self) -> Kind:
-        """What running it makes: recordings alone are no sweep, since one replay compares them all."""
+        """Kind of the job: recordings alone make no sweep, since one replay compares them all."""
         if self.scene.replay is not None and all(axis.key == RECORDING_KEY for axis in self.scene.sweep):
             return Kind.replay
         return Kind.campaign if self.scene.sweep else Kind.run
 
 
 def taken_scene(text: str, shelf: Shelf, recordings: Sequence[str] = ()) -> Taken:
-    """Return a scene that was submitted as TOML.
+    """Return the accepted scene of a submitted TOML text.
 
-    Recordings are named or given by their ids, where the scene names none itself. SceneError has all of its problems;
-    among them files that the service does not have: a stranger names no paths here.
+    Recordings are given by name or id, if the scene names none itself. Raise SceneError with all problems of the scene,
+    such as files that the service does not have: a submitted scene cannot name paths.
     """
     document = parse_scene_toml(text, SOURCE)
     files, problems = _files(document, shelf)
@@ -65,7 +65,7 @@ def taken_scene(text: str, shelf: Shelf, recordings: Sequence[str] = ()) -> Take
         problems += linked(f"recordings[{place}]", name, shelf, files)
     if problems:
         raise SceneError(problems)
-    # files count from the folder of the scene
+    # paths of files are relative to the folder of the scene
     source = str(shelf.fmus.folder / SOURCE)
     try:
         scene = parse_scene(text, source)
@@ -86,7 +86,7 @@ def taken_scene(text: str, shelf: Shelf, recordings: Sequence[str] = ()) -> Take
 
 
 def _files(document: Mapping[str, Any], shelf: Shelf) -> tuple[dict[str, Path], list[str]]:
-    """Return the files that a scene names, each found in the service, and what is wrong with the names."""
+    """Return the files that a scene names, each found in the service, and the problems of the names."""
     files, problems = dict[str, Path](), list[str]()
     package, known = frozenset(map(letters_of, components())), ", ".join(known_fmus(shelf))
     own = frozenset(shelf.fmus.names())
@@ -115,7 +115,7 @@ def known_fmus(shelf: Shelf) -> list[str]:
 
 
 def linked(key: str, name: Any, shelf: Shelf, files: dict[str, Path]) -> list[str]:
-    """Note the file of a recording; return what is wrong with its name."""
+    """Add the file of a recording to `files`; return the problems of its name."""
     try:
         files[name] = shelf.recordings.file(shelf.recordings.find(str(name)))
     except UsageError as error:
@@ -129,15 +129,15 @@ def linked(key: str, name: Any, shelf: Shelf, files: dict[str, Path]) -> list[st
 
 
 def located(problems: Sequence[str], text: str) -> list[dict[str, Any]]:
-    """Return problems with their lines and columns in the text, from 1; above `MOST_PROBLEMS` their number.
+    """Return problems with their lines and columns in the text, from 1; beyond `MOST_PROBLEMS` only their number.
 
-    Where a key is absent, the place is that of its table.
+    An absent key has the place of its table.
 
     >>> located(["scene: body.mass: expected a number > 0, got -1."], "# a mass\\n[body]\\n  mass = -1")
     [{'message': 'body.mass: expected a number > 0, got -1.', 'line': 3, 'column': 3}]
     """
     places, more = Places(text), len(problems) - MOST_PROBLEMS
-    if more > 1:  # one more is the number of those that the scene reader has left out
+    if more > 1:  # a single one more is already the count of problems that the scene reader omitted
         problems = [*problems[:MOST_PROBLEMS], f"{SOURCE}: and {more} more problems."]
     return [_located(problem, places) for problem in problems]
 
@@ -153,6 +153,6 @@ def _located(problem: str, places: Places) -> dict[str, Any]:
 
 
 def title_of(text: str) -> str:
-    """Return the title that a scene gives itself; empty without one."""
+    """Return the title of a scene; empty without one."""
     header = parse_toml(text).get("scene", {})
     return str(header.get("title", "")) if isinstance(header, Mapping) else ""

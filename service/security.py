@@ -1,4 +1,4 @@
-"""Who may ask, and what any answer says to a browser: the token, the size of requests, headers."""
+"""Access to the service, and headers for browsers: the token, the size of requests, headers of answers."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from vibroimpact.service.sessions import Sessions
 
 HEALTH = "/healthz"
 OPEN_PATHS = (HEALTH, *page_files())
-"""What is answered without a token."""
+"""Paths that are answered without a token."""
 MOST_BYTES = 4 * 2**20
-"""Size of a request, byte."""
+"""Largest size of a request, byte."""
 MOST_UPLOADED = {"/api/v1/recordings": 256 * 2**20, "/api/v1/fmus": 64 * 2**20}
-"""Likewise where files are uploaded."""
+"""Largest size of a request that uploads a file, byte, by path."""
 LOG = logging.getLogger("vibroimpact.service")
 HEADERS = (
     (b"x-content-type-options", b"nosniff"),
@@ -50,7 +50,7 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 def token_of(folder: Path) -> str:
     """Return the token of a service, made at its first start in a file that only its owner reads.
 
-    UsageError: others may read the file, or there is no token in it.
+    Raise UsageError if others may read the file, or if it holds no token.
     """
     path = folder / "token"
     try:
@@ -84,9 +84,9 @@ def _token_in(path: Path) -> str:
 
 
 class Guarded:
-    """An ASGI application behind its token: asks for it, limits what is sent, and adds headers to all answers.
+    """An ASGI application that requires the token, limits the size of requests, and adds headers to all answers.
 
-    The sessions of its page are as good as the token; the hosts are names by which the service may be asked.
+    A session of the page replaces the token; the hosts are the valid names of the service.
     """
 
     def __init__(self, app: Application, token: str, sessions: Sessions, hosts: Hosts) -> None:
@@ -119,7 +119,7 @@ class Guarded:
         await (refused or self._app)(scope, receive, with_headers)
 
     def _refused(self, scope: Scope, headers: dict[bytes, bytes], is_known: bool) -> Application | None:
-        """Return the refusal of a request by its head alone; None where it is taken."""
+        """Return the refusal of a request by its head alone; None if it is accepted."""
         if why := self._hosts.why_not(headers.get(b"host"), (scope.get("server") or ("",))[0]):
             return answer(HTTPStatus.MISDIRECTED_REQUEST, why)
         if scope["path"] not in OPEN_PATHS and not is_known:
@@ -146,7 +146,7 @@ class Guarded:
 
 
 def _note(scope: Scope, status: int, seconds: float, is_known: bool) -> None:
-    """Log a request that changes something or is refused; those that look alone are too many."""
+    """Log a request that changes something or is refused; mere reads are too many."""
     if scope["method"] in ("GET", "HEAD") and status < HTTPStatus.BAD_REQUEST:
         return
     job = _JOB.search(scope["path"])

@@ -1,4 +1,4 @@
-"""Files that are sent, whole or a range of them; what is no range of a file is refused as everything else is."""
+"""Files as answers, whole or a range; an invalid range is refused in the usual form."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _RULES = {
 
 
 class SentFile(FileResponse):
-    """A file; 400 and 416 of its ranges are problem details."""
+    """A file; the refusals 400 and 416 of a range are problem details."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the file, or the refusal of the range that was asked for."""
+        """Send the file, or the refusal of the requested range."""
         refused: Message | None = None
 
         async def watched(message: Message) -> None:

@@ -1,4 +1,4 @@
-"""`vibroimpact serve`: one service on one folder and one port, from its first look at both to its end."""
+"""`vibroimpact serve`: one service on one folder and one port, from the first checks to its end."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ from vibroimpact.service.supervisor import Supervisor
 
 _HOST = Argument("host")
 FMUS_HELD = 8
-"""Unpacked FMUs that the service itself keeps from being swept: it reads their descriptions, its jobs run them."""
+"""Number of unpacked FMUs that the service keeps in the cache: it reads their descriptions, its jobs run them."""
 BACKLOG = 128
-"""Connections that are taken in one turn of the event loop."""
+"""Number of connections accepted in one turn of the event loop."""
 MOST_UNTAKEN = 4096
-"""Connections that wait to be taken; the system drops one more, whose client tries again after 1 s."""
+"""Number of connections waiting to be accepted; beyond it the system drops one, whose client retries after 1 s."""
 LAST_SECONDS = 2
-"""For answers that are under way when the service is told to end."""
+"""Time for answers in progress when the service is told to end, s."""
 
 
 def serve(options: Serve) -> None:
     """Serve until a signal ends it.
 
-    UsageError: the folder or the port is taken, the address is not of this machine alone and nobody allowed that, or
-    nothing is reached over loopback.
+    Raise UsageError if the folder or the port is in use, if the address is public without permission, or if connections
+    over loopback fail.
     """
     folder, host = options.data, options.host
     _refuse_remote(host, options.allow_remote)
@@ -78,7 +78,7 @@ def serve(options: Serve) -> None:
 
 
 class _Server(uvicorn.Server):
-    """Serves an application on connections that are limited."""
+    """Server of an application on limited connections."""
 
     def __init__(self, app: Guarded) -> None:
         logging.getLogger("uvicorn.access").disabled = True
@@ -99,11 +99,11 @@ class _Server(uvicorn.Server):
         asyncio.get_running_loop().set_exception_handler(self._connections.on_loop_error)
         await super().startup(sockets)
         for listening in sockets or ():
-            listening.listen(MOST_UNTAKEN)  # asyncio has made it as long as its own turns
+            listening.listen(MOST_UNTAKEN)  # asyncio has set the number of its own turns
 
 
 def _make_own(folder: Path) -> None:
-    """Make the folder of a service, which nobody else reads; one with other things in it is refused."""
+    """Make the folder of a service, private to its user; raise UsageError for a folder with other contents."""
     refuse_foreign_folder(folder, DATABASE)
     if folder.is_dir() and not (folder / DATABASE).exists() and any(folder.iterdir()):
         raise UsageError(
@@ -124,7 +124,7 @@ def reached(host: str) -> str:
 
 @contextmanager
 def _written_url(path: Path, url: str) -> Iterator[None]:
-    """Let clients find the address of a service in its folder while it runs; they can be given it otherwise."""
+    """Keep the address of a running service in its folder for clients; they can also be given it otherwise."""
     try:
         write_atomically(path, f"{url}\n".encode())
     except OSError as error:
@@ -159,12 +159,12 @@ def _refuse_remote(host: str, allow_remote: bool) -> None:
 
 def _bound(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # with its protocol said, asyncio sends without delay: else an answer of two writes waits 40 ms for the client's ACK
+    # without the protocol, asyncio delays small packets: an answer of two writes would wait 40 ms for the client's ACK
     listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((host, port))
-        listening.listen(MOST_UNTAKEN)  # who reads the address below may ask at once
+        listening.listen(MOST_UNTAKEN)  # a reader of the address below may connect at once
     except OSError as error:
         listening.close()
         raise UsageError(

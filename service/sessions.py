@@ -1,6 +1,6 @@
 """Sessions of the page: the token, sent once, becomes a cookie that no script reads and no other site can use.
 
-The cookie is no secret of its own: the time at which it ends, and the HMAC of that time with the token as its key. So
+The cookie holds no secret of its own. It is its time of expiry, and the HMAC of this time with the token as its key. So
 sessions survive a restart of the service, and a new token ends all of them.
 """
 
@@ -13,14 +13,14 @@ import time
 from urllib.parse import urlsplit
 
 SECONDS = 12 * 3600
-"""For which a session lasts."""
+"""Duration of a session, s."""
 SAFE_METHODS = ("GET", "HEAD")
 OWN_SITES = ("same-origin", "none")
-"""What a browser says of requests of the page itself, and of an address that somebody typed."""
+"""Sec-Fetch-Site values of requests of the page itself, and of an address that a person typed."""
 
 
 class Sessions:
-    """Makes and knows the cookies of one service.
+    """Makes and checks the cookies of one service.
 
     >>> sessions = Sessions("token")
     >>> sessions.is_known(sessions.made()), sessions.is_known("99999999999.forged")
@@ -29,7 +29,7 @@ class Sessions:
 
     def __init__(self, token: str) -> None:
         self._key = token.encode()
-        # browsers send cookies to all ports of a machine: each service has a name of its own
+        # browsers send cookies to all ports of a machine: each service has its own name for the cookie
         self.cookie = f"vibroimpact-{self._signed('name')[:12]}"
         self._value = re.compile(rf"(?:^|[; ]){self.cookie}=([0-9]{{1,12}}\.[0-9a-f]{{64}})(?=;|$)")
 
@@ -39,14 +39,14 @@ class Sessions:
         return f"{end}.{self._signed(end)}"
 
     def is_known(self, value: str) -> bool:
-        """Whether this is a session that has not ended."""
+        """Whether a value is a session that has not expired."""
         end, _, signature = value.partition(".")
         signed = hmac.compare_digest(signature.encode(), self._signed(end).encode())
         return signed and float(end) > time.time()
 
     def are_in(self, headers: dict[bytes, bytes], method: str) -> bool:
         """Whether a request carries a session, and comes from the page of this service itself."""
-        # the sender is not known yet: one cookie is looked for, the others are not parsed
+        # the sender is not known yet: only one cookie is searched for, the others are not parsed
         found = self._value.search(headers.get(b"cookie", b"").decode("latin-1"))
         if found is None or not self.is_known(found[1]):
             return False
@@ -59,7 +59,7 @@ class Sessions:
 
 
 def is_own_origin(headers: dict[bytes, bytes]) -> bool:
-    """Whether a browser says that a request comes from a page of the host that it goes to.
+    """Whether the browser states that a request comes from a page of its target host.
 
     >>> is_own_origin({b"host": b"127.0.0.1:8737", b"origin": b"http://127.0.0.1:8737"})
     True

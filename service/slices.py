@@ -1,4 +1,4 @@
-"""What the page draws of a campaign: some thousands of values of one variable, whichever the size of the campaign."""
+"""Data of a campaign for the page to draw: some thousands of values of one variable, for campaigns of any size."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from vibroimpact.service.landed import Landed
 from vibroimpact.service.run_classes import named_classes
 
 LEVELS = 2000
-"""Values of a run that differ by less than this share of the range of all are one point of a diagram."""
+"""Number of levels in the range of all values; values of a run in the same level are drawn as one point."""
 
 
 class Selection:
-    """The part of a campaign that is asked for, by swept parameters.
+    """Selection of a part of a campaign, by swept parameters.
 
-    They are held `at` the nearest value that there is, or `within` a lowest and a highest one.
+    Parameters are held `at` the nearest existing value, or limited `within` a lowest and a highest value.
     """
 
     def __init__(self, at: dict[str, float], within: dict[str, tuple[float, float]]) -> None:
@@ -27,7 +27,7 @@ class Selection:
 
     @classmethod
     def from_words(cls, at: Sequence[str], within: Sequence[str]) -> Selection:
-        """Read `NAME:VALUE` and `NAME:LOW:HIGH`; another text raises ValueError with what was expected.
+        """Return the selection of `NAME:VALUE` and `NAME:LOW:HIGH`; raise ValueError for another form.
 
         >>> Selection.from_words(["restitution:0.7"], ["angular_frequency:0.8:0.9"]).within
         {'angular_frequency': (0.8, 0.9)}
@@ -37,7 +37,7 @@ class Selection:
         return cls(held, ranges)
 
     def runs(self, landed: Landed) -> NDArray[np.bool_]:
-        """Return which runs are asked for; a name that is no swept parameter raises ValueError."""
+        """Return which runs are selected; raise ValueError for a name that is no swept parameter."""
         names = [axis.name for axis in landed.axes]
         for name in (*self.at, *self.within):
             if name not in names:
@@ -67,7 +67,7 @@ def _read(option: str, word: str, count: int) -> tuple[str, list[float]]:
 def slice_of(landed: Landed, selection: Selection, most: int) -> dict[str, Any]:
     """Return columns of at most `most` rows: run, direction, outcome, coordinates, value.
 
-    `rows` is how many there are, `every` how many values of each axis of a map one is taken of.
+    `rows` is the full number of rows; a map keeps one of `every` values of each axis.
     """
     kept, every = selection.runs(landed), 1
     per_run = landed.owners.size == landed.runs.size
@@ -102,7 +102,7 @@ def slice_of(landed: Landed, selection: Selection, most: int) -> dict[str, Any]:
 
 
 def _spanned(landed: Landed, selection: Selection) -> list[int]:
-    """Return the places of the axes that are not held, one of those that move together."""
+    """Return the places of the axes that are not held, one for each group of axes that vary together."""
     first: dict[str, int] = {}
     for place, axis in enumerate(landed.axes):
         if axis.name not in selection.at:
@@ -111,7 +111,7 @@ def _spanned(landed: Landed, selection: Selection) -> list[int]:
 
 
 def _coarser_grid(coordinates: NDArray[np.float64], every: int) -> NDArray[np.bool_]:
-    """Return which runs lie on every so many values of each axis, so that a map has no gaps but larger cells."""
+    """Return the runs on every n-th value of each axis (n = `every`): a map keeps no gaps, but larger cells."""
     chosen = np.ones(coordinates.shape[1], dtype=bool)
     if every > 1:
         for column in coordinates:
@@ -121,7 +121,7 @@ def _coarser_grid(coordinates: NDArray[np.float64], every: int) -> NDArray[np.bo
 
 
 def _distinct(owners: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return one row for all values of a run that a diagram cannot tell apart."""
+    """Return one row for all values of a run that a diagram shows as one point."""
     usable = np.isfinite(values)
     if not usable.any():
         return np.flatnonzero(usable)
@@ -133,7 +133,7 @@ def _distinct(owners: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray
 
 
 def finite(values: NDArray[Any]) -> list[float | None]:
-    """Return numbers as JSON has them: null for what is not finite.
+    """Return numbers for JSON, with null in place of numbers that are not finite.
 
     >>> finite(np.array([1.0, np.nan]))
     [1.0, None]

@@ -1,8 +1,8 @@
-"""What the service knows of its jobs: SQLite beside their folders, the truth that outlives every process.
+"""The service's record of its jobs: SQLite next to their folders, which outlives every process.
 
-A job is a scene with its state; its folder `jobs/ID` has `scene.toml`, `log.txt`, the files that it reads, and
-what the command line would write: `campaign/` of a sweep, else `run.nc`, `replay.nc` or `estimates.nc`. Events are
-numbered once and for all, so that a reader who comes back asks for those after the last one that it has.
+A job is a scene with its state. Its folder `jobs/ID` has `scene.toml`, `log.txt` and the files that it reads. Results
+are those of the command line: `campaign/` for a sweep, else `run.nc`, `replay.nc` or `estimates.nc`. Events have
+permanent numbers, so that a reader who comes back asks for those after its last one.
 """
 
 from __future__ import annotations
@@ -43,23 +43,23 @@ CREATE TABLE IF NOT EXISTS recordings (
     source TEXT NOT NULL, bytes INTEGER NOT NULL, channels TEXT NOT NULL, created REAL NOT NULL);
 """
 LAYOUT = 2
-"""Of the database; a service of another version refuses it."""
+"""Version of the database's layout; a service of another version refuses the database."""
 LOG = logging.getLogger("vibroimpact.service")
 DATABASE = "service.sqlite"
 PROGRESS_READ = 20
-"""Events of progress, the last ones, over which the rate of a job is taken."""
+"""Number of the latest events of progress that determine the rate of a job."""
 FORGOTTEN = ".forgotten"
-"""Ending of the folder of a job while it is removed."""
+"""Suffix of the folder of a job during its removal."""
 LOG_FILE = "log.txt"
-"""What the process of a job says, in the folder of the job: there since it has begun."""
+"""Log of a job's process, in the folder of the job; it exists once the job has begun."""
 HELD_SECONDS = 1.0
-"""How long a database that another program holds is waited for; all other requests wait meanwhile."""
+"""Time to wait for a database that another program has locked, s; all other requests wait meanwhile."""
 MOST_EVENTS_READ = 500
-"""Events that one question is answered with."""
+"""Largest number of events in one answer."""
 
 
 class State(StrEnum):
-    """Where a job is."""
+    """State of a job."""
 
     queued = "queued"
     running = "running"
@@ -70,7 +70,7 @@ class State(StrEnum):
 
 
 class Kind(StrEnum):
-    """What a job makes."""
+    """Kind of a job's result."""
 
     campaign = "campaign"
     run = "run"
@@ -84,21 +84,21 @@ OUTPUTS = {
     Kind.replay: "replay.nc",
     Kind.estimate: "estimates.nc",
 }
-"""Where the dataset of a job of each kind is, in its folder."""
+"""Path of the dataset of a job of each kind, in its folder."""
 ENDED = (State.cancelled, State.failed, State.done)
-"""States from which nothing goes on by itself."""
+"""States that a job does not leave by itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A scene that was submitted."""
+    """A submitted scene with its state."""
 
     number: int
-    """In the order of submission, from 1."""
+    """Number in the order of submission, from 1."""
     id: str
     """32 hexadecimal digits."""
     title: str
-    """Of its scene."""
+    """Title of its scene."""
     state: State
     workers: int | None
     """Worker processes; None: one for each processor."""
@@ -109,20 +109,20 @@ class Job:
     """`created`, `started` and `ended`: seconds since 1970."""
     total: int
     done: int
-    """Points of the `total`; 0 of 0 before it has begun."""
+    """Number of finished points of the `total`; 0 of 0 before it has begun."""
     attempts: int
-    """How often it was started."""
+    """Number of starts of the job."""
     message: str
-    """Why it is where it is, in words; empty where nothing is to be said."""
+    """Reason for the present state, in words; empty if there is nothing to explain."""
     options: dict[str, Any]
-    """What its process is told beside its kind; see `job_process.Work`."""
+    """Options of its process besides its kind; see `job_process.Work`."""
     outcomes: dict[str, int]
-    """How many points ended in each way."""
+    """Number of points with each outcome."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a job: its number, when (seconds since 1970), what, and the job as it was then."""
+    """An event of a job: its number, time (seconds since 1970), kind, and the job at that time."""
 
     id: int
     job: str
@@ -132,16 +132,16 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What a job is made of."""
+class NewJob:
+    """A new job, before it is accepted."""
 
     kind: Kind
     title: str
     text: str = ""
-    """The scene; empty where there is none."""
+    """Text of the scene; empty without a scene."""
     workers: int | None = None
     files: dict[str, Path] = field(default_factory=dict)
-    """What it reads by names in the job's folder: linked, so that what is deleted later stays there."""
+    """Files that the job reads, by names in its folder; hard links keep them when the originals are deleted."""
     options: dict[str, Any] = field(default_factory=dict)
 
 
@@ -150,11 +150,11 @@ class KeyReusedError(Exception):
 
 
 class QueueFullError(Exception):
-    """As many jobs wait as may wait."""
+    """The queue has its largest number of jobs."""
 
 
 class Store:
-    """The jobs of the folder of a service; the database is `service.sqlite` in it."""
+    """The jobs in the folder of a service; the database is `service.sqlite` in it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -164,7 +164,7 @@ class Store:
         )
         try:
             self._connection.execute("PRAGMA journal_mode = WAL")
-            self._connection.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
+            self._connection.execute("PRAGMA synchronous = FULL")  # an accepted job survives a power cut
             self._refuse_other_layout()
             self._connection.executescript(f"{SCHEMA}PRAGMA user_version = {LAYOUT};")
         except sqlite3.DatabaseError as error:
@@ -190,20 +190,20 @@ class Store:
             self._connection.close()
 
     def rows(self, question: str, *values: Any) -> list[Any]:
-        """Return the rows that answer a question in SQL."""
+        """Return the rows that answer an SQL query."""
         with self._lock:
             return self._connection.execute(question, values).fetchall()
 
     @contextlib.contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """Open a transaction, which is taken back where what is done in it fails."""
+        """Open a transaction, which is rolled back if its body raises."""
         with self._lock:
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection
                 self._connection.execute("COMMIT")
             except BaseException:
-                if self._connection.in_transaction:  # a full disk has taken it back already
+                if self._connection.in_transaction:  # a full disk has already rolled it back
                     self._connection.execute("ROLLBACK")
                 raise
 
@@ -216,19 +216,18 @@ class Store:
         return self.folder_of(job) / "scene.toml"
 
     def dataset_of(self, job: Job) -> Path:
-        """Return where the dataset of a job is, once it is done."""
+        """Return the path of the dataset of a job, which exists once the job is done."""
         return self.folder_of(job.id) / OUTPUTS[job.kind]
 
     # ---- jobs ----
 
     def submit(
-        self, asked: Asked, *, key: str = "", digest: str = "", most_queued: int | None = None
+        self, new_job: NewJob, *, key: str = "", digest: str = "", most_queued: int | None = None
     ) -> tuple[Job, bool]:
-        """Accept what was asked for; return its job, and whether it is new.
+        """Accept a request; return its job, and whether the job is new.
 
-        The same idempotency key with the same digest of the request again is the same job. QueueFullError: as many jobs
-        as may wait, however many requests come at once, wait already. KeyReusedError: the key came with another digest
-        before.
+        A repeated idempotency key with the same digest of the request gives the same job. Raise KeyReusedError if the
+        digest differs. Raise QueueFullError if the queue is full; simultaneous requests cannot exceed its limit.
         """
         with self.transaction() as database:
             if key:
@@ -240,13 +239,13 @@ class Store:
             if most_queued is not None and self.counts()[State.queued] >= most_queued:
                 raise QueueFullError
             name = uuid.uuid4().hex
-            self._fill(name, asked)
+            self._fill(name, new_job)
             database.execute(
                 "INSERT INTO jobs (id, title, state, workers, kind, created, total, done, attempts, message, options) "
                 "VALUES (?, ?, ?, ?, ?, ?, 0, 0, 0, '', ?)",
                 (
-                    *(name, asked.title, State.queued, asked.workers, asked.kind, time.time()),
-                    json.dumps(asked.options),
+                    *(name, new_job.title, State.queued, new_job.workers, new_job.kind, time.time()),
+                    json.dumps(new_job.options),
                 ),
             )
             if key:
@@ -254,23 +253,23 @@ class Store:
             self._tell(database, name, "state")
             return self.job(name), True
 
-    def _fill(self, name: str, asked: Asked) -> None:
+    def _fill(self, name: str, new_job: NewJob) -> None:
         """Make the folder of a job, with its scene and the files that it reads."""
         folder = self.folder_of(name)
         folder.mkdir(parents=True)
         try:
-            if asked.text:
-                write_atomically(self.scene_of(name), asked.text.encode())
-            for link, file in asked.files.items():
+            if new_job.text:
+                write_atomically(self.scene_of(name), new_job.text.encode())
+            for link, file in new_job.files.items():
                 _link(file, folder / link)
         except OSError:
             shutil.rmtree(folder)
             raise
 
     def remove_strays(self) -> None:
-        """Remove the folders of jobs that were not accepted, or forgotten, when the service was killed.
+        """Remove the folders of jobs whose acceptance or deletion was interrupted when the service was killed.
 
-        What has begun and is unknown is another database's, of a backup for example: it is left alone.
+        A job that has begun and is not in the database belongs to another one, for example a backup: its folder stays.
         """
         known = {name for (name,) in self.rows("SELECT id FROM jobs")}
         for folder in (self.folder / "jobs").glob("*"):
@@ -281,7 +280,7 @@ class Store:
                 LOG.warning("a folder of no known job is left alone", extra={"why": folder.name})
 
     def remove_folder(self, name: str) -> None:
-        """Remove the folder of a job that was forgotten, as far as it is there."""
+        """Remove the folder of a deleted job, as far as it exists."""
         folder = self.folder_of(name)
         doomed = folder.with_name(f"{name}{FORGOTTEN}")  # a kill while it is removed leaves no job's folder
         with contextlib.suppress(FileNotFoundError):
@@ -289,7 +288,7 @@ class Store:
             shutil.rmtree(doomed)
 
     def job(self, name: str) -> Job:
-        """Return a job; an unknown name raises KeyError."""
+        """Return a job; raise KeyError for an unknown name."""
         rows = self.rows(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", name)
         if not rows:
             raise KeyError(name)
@@ -311,7 +310,7 @@ class Store:
         ]
 
     def rate(self, name: str) -> float:
-        """Return how many points of a job were done a second over its last progress; 0 before there is any."""
+        """Return the rate of a job over its last progress, points/s; 0 before any progress."""
         rows = self.rows(
             "SELECT at, data FROM events WHERE job = ? AND kind = 'progress' ORDER BY id DESC LIMIT ?",
             *(name, PROGRESS_READ),
@@ -323,7 +322,7 @@ class Store:
         return float(done / (last - first)) if last > first else 0.0
 
     def outcomes(self) -> dict[str, int]:
-        """Return how many points of all jobs ended in each way."""
+        """Return the number of points of all jobs with each outcome."""
         found: Counter[str] = Counter()
         for (text,) in self.rows("SELECT outcomes FROM jobs WHERE outcomes != '{}'"):
             found.update(json.loads(text))
@@ -334,12 +333,12 @@ class Store:
         return next(iter(self.jobs_in(State.queued)), None)
 
     def counts(self) -> dict[State, int]:
-        """Return how many jobs are in each state."""
+        """Return the number of jobs in each state."""
         rows = self.rows("SELECT state, COUNT(*) FROM jobs GROUP BY state")
         return dict.fromkeys(State, 0) | {State(state): count for state, count in rows}
 
     def change(self, name: str, *, only_from: Sequence[State] = tuple(State), **values: Any) -> bool:
-        """Change columns of a job, and tell it as an event; return whether it was in one of the states named."""
+        """Change columns of a job, and record an event; return whether its state was one of `only_from`."""
         with self.transaction() as database:
             assignments = ", ".join(f"{column} = ?" for column in values)
             places = ", ".join("?" for _ in only_from)
@@ -354,14 +353,14 @@ class Store:
         return bool(changed)
 
     def requeue_running(self, why: str) -> None:
-        """Put the jobs whose process has gone back into the queue, and end those that were to be cancelled."""
+        """Put jobs whose process has gone back into the queue, and end those that were being cancelled."""
         for job in self.jobs_in(State.running):
             self.change(job.id, state=State.queued, message=why)
         for job in self.jobs_in(State.cancelling):
             self.change(job.id, state=State.cancelled, ended=time.time())
 
     def delete(self, name: str) -> bool:
-        """Forget a job that has ended, and its events; return whether it had. Its folder is the caller's."""
+        """Delete an ended job and its events; return whether it had ended. The caller removes its folder."""
         with self.transaction() as database:
             places = ", ".join("?" for _ in ENDED)
             deleted = database.execute(
@@ -382,7 +381,7 @@ class Store:
         )
 
     def events(self, name: str, *, after: int = 0) -> list[Event]:
-        """Return the events of a job after one of them, in their order."""
+        """Return the events of a job after a given one, in order."""
         rows = self.rows(
             "SELECT id, job, at, kind, data FROM events WHERE job = ? AND id > ? ORDER BY id LIMIT ?",
             *(name, after, MOST_EVENTS_READ),
@@ -400,7 +399,7 @@ def _link(file: Path, name: Path) -> None:
         os.link(file, name)
     except FileNotFoundError:
         raise
-    except OSError:  # a file system without links
+    except OSError:  # a file system without hard links
         shutil.copyfile(file, name)
 
 

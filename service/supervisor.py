@@ -1,7 +1,7 @@
-"""Runs the queue: one job at a time in a process of its own, which may die, hang, or be cancelled.
+"""Supervisor of the queue: it runs one job at a time in a separate process, which may die, hang, or be cancelled.
 
-Nothing of a job lives here but its process. What it has computed is in its folder, whose parts are complete whatever
-ends it; what is known of it is in the store. So a service that is killed and started again goes on where it was.
+Only the process of a job lives here. Its results are in its folder, whose parts are complete after any interruption;
+its state is in the store. So a killed service continues after its restart.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from vibroimpact.service.problems import is_full, is_held, is_short, why_later
 from vibroimpact.service.store import LOG, LOG_FILE, Job, State, Store
 
 GRACE = 0.5
-"""Seconds that a cancelled job has to end in good order, before it and its workers are killed."""
+"""Time for a cancelled job to end in good order, s; then it and its workers are killed."""
 MOST_ATTEMPTS = 5
-"""How often a job whose process was killed by something else is started without a new point between."""
+"""Number of starts of a job whose process was killed from outside, if no new point was computed in between."""
 IDLE = 0.2
-"""Seconds between two looks into an empty queue."""
+"""Interval between two checks of an empty queue, s."""
 PAUSE = 2.0
-"""Seconds before something is tried again that a full disk or an absent scheduler hinders."""
+"""Time before a retry after a full disk or an absent scheduler, s."""
 LONGEST_PAUSE = 30.0
-"""Seconds between two attempts at most; each doubles the pause while something hinders all jobs."""
+"""Largest time between two attempts, s; the pause doubles while all jobs are hindered."""
 LAST_LINES = 5
-"""Of what a process wrote to its standard error, that a failure is told with."""
+"""Number of last lines of a process's standard error that the report of a failure can use."""
 
 
 class Supervisor:
     """Takes jobs from a store and runs them until it is closed.
 
-    Workers of a Dask scheduler compute; None: workers on this machine.
+    Workers of a Dask scheduler compute; without a scheduler, workers on this machine.
     """
 
     def __init__(self, store: Store, scheduler: str | None = None) -> None:
@@ -53,19 +53,19 @@ class Supervisor:
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
 
     def start(self) -> None:
-        """Take up what a dead service has left, and begin."""
+        """Requeue the jobs of a dead service, and begin."""
         self._store.remove_strays()
         self._store.requeue_running("the service was restarted")
         self._thread.start()
 
     def close(self) -> None:
-        """End the job that runs, which waits for the next start, and stop."""
+        """End the running job, which waits for the next start, and stop."""
         self._closing.set()
         self._stop(None)
         self._thread.join()
 
     def cancel(self, name: str) -> bool:
-        """Cancel a job that waits or runs; return whether it did."""
+        """Cancel a waiting or running job; return whether it was one."""
         waiting = self._store.change(
             name, only_from=[State.queued], state=State.cancelled, ended=time.time(), message="cancelled"
         )
@@ -92,7 +92,7 @@ class Supervisor:
                 self._closing.wait(PAUSE)
 
     def _take(self) -> None:
-        """Run the job that has waited longest, or wait for one."""
+        """Run the job that has waited longest, or wait for a job."""
         job = self._store.next_queued()
         if job is None:
             self._closing.wait(IDLE)
@@ -102,11 +102,11 @@ class Supervisor:
         except OSError as error:
             if why := why_later(error):
                 self._wait_out(f"{why}: {error}", job)
-            else:  # of its folder; the queue goes on with the next
+            else:  # the error concerns its folder; the queue goes on with the next job
                 self._end(job, State.failed, f"its folder cannot be used: {error}")
 
     def _wait_out(self, why: str, job: Job) -> None:
-        """Wait before the next attempt while something hinders all jobs, which is logged once."""
+        """Wait before the next attempt while all jobs are hindered; the reason is logged once."""
         if not self._pause:
             LOG.warning("jobs wait", extra={"job": job.id, "why": why})
         self._pause = min(max(2.0 * self._pause, PAUSE), LONGEST_PAUSE)
@@ -131,9 +131,9 @@ class Supervisor:
                 process = self._open(job, folder)
                 self._pause = 0.0
                 with process:  # closes its pipes
-                    told = self._listen(job, process, log)
+                    report = self._listen(job, process, log)
                     code = process.wait()
-                    process.kill_session()  # workers that outlived it
+                    process.kill_session()  # ends workers that outlived it
         except OSError as error:
             if why := why_later(error):
                 self._change(job, state=State.queued, message=f"{why}: {error}", attempts=job.attempts)
@@ -142,7 +142,7 @@ class Supervisor:
             raise
         with self._lock:
             self._running = None
-        self._note_end(job, code, told)
+        self._note_end(job, code, report)
 
     def _open(self, job: Job, folder: Path) -> Process:
         work = Work(job.kind, job.workers, self._scheduler, job.options)
@@ -154,82 +154,82 @@ class Supervisor:
             self._stop(job.id)
         return process
 
-    def _listen(self, job: Job, process: Process, log: JobLog) -> Told:
-        """Follow what a process says until it ends."""
-        told = Told()
+    def _listen(self, job: Job, process: Process, log: JobLog) -> JobReport:
+        """Read the messages of a process until it ends."""
+        report = JobReport()
 
         def copy_errors() -> None:
             for line in process.lines_of_errors():
-                told.last.append(line)
+                report.last.append(line)
                 log.write(line)
 
         errors = threading.Thread(target=copy_errors, daemon=True)
         try:
             errors.start()
-        except RuntimeError as error:  # no thread more: the machine is short of memory or processes
+        except RuntimeError as error:  # no further thread: the machine is short of memory or processes
             raise OSError(errno.ENOMEM, str(error)) from error
         for line in process.lines():
-            said = _said(line)
-            total, done = said.get("total"), said.get("done")
+            content = _message_in(line)
+            total, done = content.get("total"), content.get("done")
             if isinstance(total, int) and isinstance(done, int):
-                told.total, told.done = total, done
-                self._note_progress(job, told)
-            told.failed = said.get("failed", told.failed)
-            told.later = said.get("later", told.later)
-            told.outcomes = said.get("outcomes", told.outcomes)
-            text = said.get("note") or said.get("failed") or said.get("later")
+                report.total, report.done = total, done
+                self._note_progress(job, report)
+            report.failed = content.get("failed", report.failed)
+            report.later = content.get("later", report.later)
+            report.outcomes = content.get("outcomes", report.outcomes)
+            text = content.get("note") or content.get("failed") or content.get("later")
             if text:
                 log.write(text)
         errors.join(timeout=GRACE)
-        return told
+        return report
 
-    def _note_progress(self, job: Job, told: Told) -> None:
-        """Note how far a job is; where the database takes nothing now, the next look or its end does."""
+    def _note_progress(self, job: Job, report: JobReport) -> None:
+        """Store the progress of a job; if the database is unavailable, a later update or the end of the job does."""
         try:
-            self._store.change(job.id, total=told.total, done=told.done)
+            self._store.change(job.id, total=report.total, done=report.done)
         except sqlite3.Error as error:
-            if not _passes(error):
+            if not _is_temporary(error):
                 raise
             LOG.warning("its progress is not noted", extra={"job": job.id, "why": str(error)})
 
-    def _note_end(self, job: Job, code: int, told: Told) -> None:
+    def _note_end(self, job: Job, code: int, report: JobReport) -> None:
         if self._store.job(job.id).state == State.cancelling:
-            self._end(job, State.cancelled, "cancelled", told)
+            self._end(job, State.cancelled, "cancelled", report)
         elif code == 0:
-            self._end(job, State.done, "", told)
+            self._end(job, State.done, "", report)
         elif self._closing.is_set():
             self._change(job, state=State.queued, message="the service was stopped")
         elif code == LATER:
-            # what hinders it is no fault of the job, and does not count as an attempt
-            self._change(job, state=State.queued, message=told.later, attempts=job.attempts)
+            # the hindrance is not the fault of the job, and does not count as an attempt
+            self._change(job, state=State.queued, message=report.later, attempts=job.attempts)
             self._closing.wait(PAUSE)
-        elif told.failed:
-            self._end(job, State.failed, told.failed, told)
-        elif code < 0 and told.done > job.done:
+        elif report.failed:
+            self._end(job, State.failed, report.failed, report)
+        elif code < 0 and report.done > job.done:
             self._change(job, state=State.queued, message=f"its process {ending(code)}", attempts=0)
         elif code in (INTERRUPTED, -signal.SIGINT) or (code < 0 and job.attempts + 1 < MOST_ATTEMPTS):
             self._change(job, state=State.queued, message=f"its process {ending(code)}")
         else:
-            last = [line for line in told.last if line.strip()]
+            last = [line for line in report.last if line.strip()]
             self._end(
-                job, State.failed, f"its process {ending(code)}" + (f": {last[-1]}" if last else ""), told
+                job, State.failed, f"its process {ending(code)}" + (f": {last[-1]}" if last else ""), report
             )
 
-    def _end(self, job: Job, state: State, message: str, told: Told | None = None) -> None:
+    def _end(self, job: Job, state: State, message: str, report: JobReport | None = None) -> None:
         known: dict[str, Any] = (
-            {} if told is None else {"outcomes": json.dumps(_sum(job.outcomes, told.outcomes))}
+            {} if report is None else {"outcomes": json.dumps(_sum(job.outcomes, report.outcomes))}
         )
-        if told is not None and told.total:
-            known |= {"total": told.total, "done": told.done}
+        if report is not None and report.total:
+            known |= {"total": report.total, "done": report.done}
         self._change(job, state=state, ended=time.time(), message=message, **known)
 
     def _change(self, job: Job, **values: Any) -> None:
-        """Note what became of a job, as soon as the database takes it; else the next start of the service does."""
+        """Store the new state of a job once the database is available; else the next start of the service does."""
         while True:
             try:
                 self._store.change(job.id, **values)
             except sqlite3.Error as error:
-                if not _passes(error):
+                if not _is_temporary(error):
                     raise
                 LOG.warning("its end is not noted yet", extra={"job": job.id, "why": str(error)})
                 if self._closing.wait(PAUSE):
@@ -238,7 +238,7 @@ class Supervisor:
                 return
 
     def _stop(self, name: str | None) -> None:
-        """End the process that runs, if it is that of the job named: first in good order, then at once."""
+        """End the running process if it belongs to the named job: first in good order, then by force."""
         with self._lock:
             if self._running is None or (name is not None and self._running[0] != name):
                 return
@@ -247,8 +247,8 @@ class Supervisor:
 
 
 @dataclass(slots=True)
-class Told:
-    """What a process has said of its job: how far it is, why it failed or waits, how points ended, its last lines."""
+class JobReport:
+    """Messages of a process about its job: progress, reason of failure or waiting, outcomes of points, last lines."""
 
     total: int = 0
     done: int = 0
@@ -259,14 +259,14 @@ class Told:
 
 
 class JobLog:
-    """The log of a job: whole lines; those that a full disk has no room for are lost, and that is logged."""
+    """The log of a job, in whole lines; lines that do not fit on a full disk are lost, and the loss is logged."""
 
     def __init__(self, path: Path, job: str) -> None:
         self._file = path.open("ab", buffering=0)
         self._job = job
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return the log itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -281,18 +281,18 @@ class JobLog:
             LOG.warning("a line of its log is lost", extra={"job": self._job, "why": str(error)})
 
 
-def _passes(error: sqlite3.Error) -> bool:
-    """Return whether what hinders the database may pass by itself."""
+def _is_temporary(error: sqlite3.Error) -> bool:
+    """Return whether an error of the database may pass by itself."""
     return is_full(error) or is_held(error) or is_short(error)
 
 
-def _said(line: str) -> dict[str, Any]:
-    """Return what a line of a process says; one that is no JSON object is a remark, of an FMU that prints."""
+def _message_in(line: str) -> dict[str, Any]:
+    """Return the message in a line of a process; a line that is no JSON object is a remark, of an FMU that prints."""
     try:
-        said = json.loads(line)
+        content = json.loads(line)
     except ValueError:
-        said = None
-    return said if isinstance(said, dict) else {"note": line}
+        content = None
+    return content if isinstance(content, dict) else {"note": line}
 
 
 def _sum(first: Mapping[str, int], second: Mapping[str, int]) -> dict[str, int]:

@@ -1,21 +1,21 @@
-"""Turns of requests without the token: one at a time, so that those with the token do not wait behind them."""
+"""Turns of requests without the token: one at a time, so that requests with the token do not wait behind them."""
 
 from __future__ import annotations
 
 import asyncio
 
 INTERVAL_SECONDS = 0.001
-"""Least time between the end of a stranger's turn and the next one, s."""
-REST = 1.0
-"""Time between two turns over the time that a turn takes, where that is more: half of the event loop is for others."""
+"""Least time between the end of an unauthenticated request's turn and the next turn, s."""
+PAUSE_RATIO = 1.0
+"""Least time between two turns, relative to the duration of a turn: half of the event loop is free for others."""
 PASSES = 2
-"""Passes of the event loop in which the request whose turn it is is answered."""
+"""Number of passes of the event loop in which the request of a turn is answered."""
 
 
 class Turns:
-    """Gives turns to connections that wait for one, the first first.
+    """Gives turns to waiting connections, first come, first served.
 
-    The event loop is free for others between two turns, however many connections wait.
+    The event loop is free for others between two turns, for any number of waiting connections.
 
     >>> async def waited():
     ...     turns = Turns()
@@ -30,7 +30,7 @@ class Turns:
         self._due = 0.0
 
     def __len__(self) -> int:
-        """Return how many connections wait."""
+        """Return the number of waiting connections."""
         return len(self._waiting)
 
     async def wait(self, connection: object) -> bool:
@@ -42,7 +42,7 @@ class Turns:
         return await turn
 
     def leave(self, connection: object) -> None:
-        """End the wait of a connection that is closed."""
+        """End the wait of a closed connection."""
         turn = self._waiting.pop(connection, None)
         if turn is not None and not turn.done():
             turn.set_result(False)
@@ -68,5 +68,5 @@ class Turns:
         if passes:
             loop.call_soon(self._pass, passes - 1, given)
             return
-        self._due = loop.time() + max(INTERVAL_SECONDS, REST * (loop.time() - given))
+        self._due = loop.time() + max(INTERVAL_SECONDS, PAUSE_RATIO * (loop.time() - given))
         self._plan()

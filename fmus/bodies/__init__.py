@@ -1,4 +1,4 @@
-"""Bodies at the points of a sweep, by the parameters of their FMUs: modes, forcing, contacts, what is observed."""
+"""Bodies at the points of a sweep, from the parameters of their FMUs: modes, forcing, contacts, observed point."""
 
 from vibroimpact.fmus.bodies.beam import BeamPoints
 from vibroimpact.fmus.bodies.body_points import BodyPoints, Columns, ModalPoints

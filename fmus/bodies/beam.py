@@ -17,13 +17,13 @@ _BOUNDARY_OF = {number: boundary for boundary, number in BOUNDARIES.items()}
 
 
 class BeamPoints(StructurePoints):
-    """Beams: modes whose modal mass is the mass of the beam; they are its state."""
+    """Beams: every mode has the mass of the beam as modal mass, and the modal displacements are the state."""
 
     START = "modal_"
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Modes, elements of a state, amplitudes of the forcing: see `StructurePoints`."""
+        """Numbers of modes, of elements of a state, and of amplitudes of the forcing: see `StructurePoints`."""
         modes = self.integers["modes"]
         return modes, modes, 1
 
@@ -57,7 +57,7 @@ class BeamPoints(StructurePoints):
         return np.asarray(displacements * np.sqrt(_mass_of(self.floats)))
 
     def _places(self) -> list[float]:
-        """Return the fraction of the length of each contact."""
+        """Return the position of each contact, as a fraction of the length."""
         return [float(self.floats[f"contact[{k}].location"]) for k in range(1, self.stops + 1)]
 
     def contact_shapes(self) -> Floats:
@@ -72,13 +72,13 @@ class BeamPoints(StructurePoints):
         return np.asarray(line * numbers["length"] / (self.contact_shapes() ** 2).sum(axis=1))
 
     def is_pushed(self) -> bool:
-        """Whether all stops are where the one force input of the FMU can act."""
+        """Whether the FMU's only force input can act at the place of all stops."""
         where = set(self._places())
         forced_there = self.integers.get("forcing.kind") == FORCE
         return len(where) == 1 and (not forced_there or where == {self.floats["forcing_location"]})
 
     def variables_at_contacts(self, what: str) -> tuple[str, ...]:
-        """Return the variables of a sensor at each contact; one force input acts at all of them."""
+        """Return the variables of a sensor at each contact; the one force input acts at all contacts."""
         if what == "force":
             return super().variables_at_contacts(what) if self.is_pushed() else ()
         places = self._places()
@@ -86,14 +86,14 @@ class BeamPoints(StructurePoints):
         return tuple(f"sensor[{where.index(place) + 1}].{what}" for place in places)
 
     def floats_of_contacts(self) -> dict[str, float]:
-        """Return the places of the sensors, and of the force where it acts at all contacts."""
+        """Return the places of the sensors, and the place of the force where it can act at all contacts."""
         where = list(dict.fromkeys(self._places()))
         found = {f"sensor[{k}].location": place for k, place in enumerate(where, start=1)}
         return found | ({"forcing_location": where[0]} if self.is_pushed() else {})
 
     @property
     def flaw(self) -> str:
-        """None."""
+        """Empty: beams have no flaw."""
         return ""
 
 
@@ -104,9 +104,9 @@ def _mass_of(numbers: Numbers) -> float:
 
 
 def rigidity_of_frequency(boundary: int, length: float, mass_per_length: float, frequency: float) -> float:
-    """Return the flexural rigidity, N m^2, that gives a beam its first natural frequency (thesis eq. 7.16).
+    """Return the flexural rigidity, N m^2, for a given first natural frequency of a beam (thesis eq. 7.16).
 
-    w_1 = (xi_1 / length)^2 sqrt(rigidity / mass_per_length), xi_1 the first eigenvalue of its boundary.
+    w_1 = (xi_1 / length)^2 sqrt(rigidity / mass_per_length); xi_1 is the first eigenvalue of the boundary.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A body with rigid stops at the points of a sweep, and the two coordinates that its motion is told in."""
+"""A body with rigid stops at the points of a sweep, in two coordinate systems for its motion."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Columns = Mapping[str, Floats]
 class ModalPoints:
     """Points as modes: arrays of shape (mode, point), (contact, point) or (contact, mode, point).
 
-    A mode is q'' + 2 decay q' + stiffness q = force cos(phase) + held, a displacement shape . q, and an impulse at a
-    contact adds `impulse` to q'.
+    A mode obeys q'' + 2 decay q' + stiffness q = force cos(phase) + held. A displacement is shape . q. A unit impulse
+    at a contact adds `impulse` to q'.
 
     Attributes
     ----------
     to_state : tuple of ndarray, shape (element, mode)
-        Of a chain or a beam: from modes to the displacements that are the body's state, for each kind of its points.
+        For a chain or a beam: matrix from modes to the displacements in the state, for each kind of structure.
     kind : ndarray of int, shape (point,)
-        Which one each point has.
+        Number of the structure of each point.
     """
 
     stiffness: Floats
@@ -43,14 +43,14 @@ class ModalPoints:
     kind: NDArray[np.int64] | None = None
 
     def states(self, q: Floats, p: Floats, points: NDArray[np.int64]) -> Floats | None:
-        """Return the whole states of structures, shape (point, 2 element); None of an oscillator, which needs none.
+        """Return the states of chains and beams, shape (point, 2 element); None for an oscillator.
 
         Parameters
         ----------
         q, p : ndarray, shape (mode, point)
-            Of all points.
+            Modal coordinates and velocities of all points.
         points : ndarray of int
-            Those that are wanted.
+            Numbers of the points whose states are returned.
         """
         if self.kind is None:
             return None
@@ -70,9 +70,9 @@ class BodyPoints(ABC):
     Attributes
     ----------
     floats : mapping of str to ndarray, shape (point,), or to float
-        Real parameters of the body's FMU, SI. Of arrays there are `in_state_coordinates`, of numbers the others.
+        Real parameters of the body's FMU, SI. `in_state_coordinates` needs arrays, the other methods need numbers.
     integers : mapping of str to int
-        Integer parameters, which all points have in common.
+        Integer parameters, common to all points.
     stops : int
         Number of contact ports with a stop.
     """
@@ -83,10 +83,10 @@ class BodyPoints(ABC):
 
     @abstractmethod
     def in_state_coordinates(self) -> ModalPoints:
-        """Return the points as modes, in the coordinates that a state is kept in.
+        """Return the points as modes, in the coordinates of a state.
 
-        They are the displacement of an oscillator and the modal displacements of a beam, and of a chain its
-        mass-normalised modes. A point that is no body of such modes is all NaN.
+        These are the displacement of an oscillator, the modal displacements of a beam, and the mass-normalised modes of
+        a chain. A point whose parameters have no such modes is all NaN.
         """
 
     @abstractmethod
@@ -100,7 +100,7 @@ class BodyPoints(ABC):
     @property
     @abstractmethod
     def flaw(self) -> str:
-        """What keeps it from flying in modes: "coupled" by its damping, or "loose"; empty where nothing does."""
+        """Reason why the body cannot fly in modes: "coupled" by its damping, or "loose"; empty without one."""
 
     # ---- contacts, in the coordinates of the state ----
 
@@ -109,17 +109,17 @@ class BodyPoints(ABC):
         """Return the displacement of each contact for 1 m of each element of the state, shape (contact, element)."""
 
     def contact_mobilities(self, shapes: Floats) -> Floats:
-        """Return how an impulse at contacts of these shapes changes the velocities, but for a factor; same shape."""
+        """Return the change of the velocities by an impulse at contacts of these shapes, up to a factor; same shape."""
         return shapes
 
     @abstractmethod
     def contact_masses(self) -> Floats:
-        """Return the mass that each stop feels when it is hit, kg, shape (contact,): equations.md 5.3 and 6.6."""
+        """Return the effective mass at each stop, kg, shape (contact,): equations.md 5.3 and 6.6."""
 
-    # ---- contacts that the FMU knows nothing of ----
+    # ---- contacts that the FMU does not know ----
 
     def is_pushed(self) -> bool:
-        """Whether inputs of an FMU without stops can act as forces at all places of stops."""
+        """Whether force inputs of an FMU without stops can act at all places of stops."""
         return True
 
     def variables_at_contacts(self, what: str) -> tuple[str, ...]:
@@ -127,17 +127,17 @@ class BodyPoints(ABC):
         return (what,) * self.stops
 
     def floats_of_contacts(self) -> dict[str, float]:
-        """Return parameters with which an FMU without stops shows its motion, and takes a force, where they are."""
+        """Return the parameters that place the sensors, and the force, of an FMU without stops at the contacts."""
         return {}
 
 
 def row_of(numbers: Numbers, name: str, count: int) -> Floats:
-    """Return an array among parameters, by the names `name[1]`, ...; what is not there is 0."""
+    """Return an array of parameters named `name[1]`, ...; absent elements are 0."""
     return np.array([numbers.get(f"{name}[{i}]", 0.0) for i in range(1, count + 1)])
 
 
 def rows_of(columns: Columns, name: str, count: int) -> Floats:
-    """Return columns `name[1]`, ..., or the one `name`, shape (count, point); what is not there is 0."""
+    """Return columns `name[1]`, ..., or the single `name`, shape (count, point); absent columns are 0."""
     none = np.zeros(len(next(iter(columns.values()))))
     if count == 1 and name in columns:
         return columns[name][None]
@@ -145,7 +145,7 @@ def rows_of(columns: Columns, name: str, count: int) -> Floats:
 
 
 def weighted(weights: Floats, values: Floats) -> Floats:
-    """Return weights (element, row, point) times values (element, point), summed: the same bits for any points."""
+    """Return the sum of weights (element, row, point) times values (element, point); points do not change its bits."""
     total: Floats = weights[0] * values[0]
     for weight, value in zip(weights[1:], values[1:], strict=True):
         total = total + weight * value

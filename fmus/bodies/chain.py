@@ -1,4 +1,4 @@
-"""Masses in a row at the points of a sweep: equations.md 5."""
+"""Chains of masses at the points of a sweep: equations.md 5."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from vibroimpact.fmus.core.modes import ChainModes, chain_modes
 
 
 class ChainPoints(StructurePoints):
-    """Chains: mass-normalised modes; a state is that of the masses."""
+    """Chains: the modes are mass-normalised, and the state holds the motion of the masses."""
 
     START = ""
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Modes, elements of a state, amplitudes of the forcing: see `StructurePoints`."""
+        """Numbers of modes, of elements of a state, and of amplitudes of the forcing: see `StructurePoints`."""
         masses = self.integers["masses"]
         return self.integers["modes"] or masses, masses, masses
 
@@ -56,18 +56,18 @@ class ChainPoints(StructurePoints):
 
     @property
     def _hit(self) -> list[int]:
-        """The mass, from 0, of each contact."""
+        """Number of the mass at each contact, from 0."""
         return [self.integers[f"contact[{k}].mass_number"] - 1 for k in range(1, self.stops + 1)]
 
     def _masses(self) -> Floats:
         return row_of(self.floats, "mass", self.integers["masses"])
 
     def contact_shapes(self) -> Floats:
-        """Return 1 for the mass of each contact, shape (contact, mass)."""
+        """Return the shapes of the contacts, shape (contact, mass): 1 at the contact's mass, else 0."""
         return np.eye(self.integers["masses"])[self._hit]
 
     def contact_mobilities(self, shapes: Floats) -> Floats:
-        """Return the shapes over the masses, shape (contact, mass)."""
+        """Return the shapes divided by the masses, shape (contact, mass)."""
         return shapes / self._masses()
 
     def contact_masses(self) -> Floats:
@@ -80,7 +80,7 @@ class ChainPoints(StructurePoints):
 
     @property
     def flaw(self) -> str:
-        """Whether its damping couples the modes, or nothing ties it to the ground."""
+        """Whether the damping couples the modes ("coupled"), or nothing ties the chain to the ground ("loose")."""
         modes = self._modes(self.floats)
         if not modes.is_classical:
             return "coupled"

@@ -1,4 +1,4 @@
-"""A body of modes with restitution stops and one harmonic force: what its orbits follow from."""
+"""A body of modes with restitution stops and one harmonic force: the input of the search for orbits."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Contact:
     direction : float
         +1: the stop is above, -1: below.
     position : float
-        m.
+        Position of the stop, m.
     restitution : float
-        Coefficient, 0 to 1.
+        Coefficient of restitution, 0 to 1.
     """
 
     shape: Floats
@@ -41,7 +41,7 @@ class Contact:
 
     @cached_property
     def mass(self) -> float:
-        """Mass that an impact meets, kg: 1 / (shape . shape), equations.md 5.3."""
+        """Effective mass at the contact, kg: 1 / (shape . shape), equations.md 5.3."""
         return 1.0 / float(self.shape @ self.shape)
 
 
@@ -52,14 +52,14 @@ class ImpactingBody:
     Attributes
     ----------
     frequencies, damping_ratios : array, shape (modes,)
-        Natural angular frequencies, rad/s; ratios.
+        Natural angular frequencies, rad/s; damping ratios.
     force, held : array, shape (modes,)
-        Modal amplitude of the harmonic force, and the constant one, N kg^(-1/2).
+        Modal amplitude of the harmonic force, and modal constant force, N kg^(-1/2).
     angular_frequency, phase : float
-        Of the force, rad/s; at time 0, rad.
+        Angular frequency of the force, rad/s; its phase at time 0, rad.
     contacts : tuple of Contact
     observed : array, shape (modes,)
-        Shape of the point that figures show.
+        Shape of the point that figures show, kg^(-1/2).
     """
 
     frequencies: Floats
@@ -73,12 +73,12 @@ class ImpactingBody:
 
     @property
     def period(self) -> float:
-        """Of the force, s."""
+        """Period of the force, s."""
         return 2.0 * np.pi / self.angular_frequency
 
     @cached_property
     def kernel(self) -> OrbitBody:
-        """The body as the C functions take it."""
+        """The body in the form that the C functions take."""
         shapes = np.array([contact.shape for contact in self.contacts])
         return OrbitBody(
             self.angular_frequency,
@@ -96,7 +96,7 @@ class ImpactingBody:
 
     @cached_property
     def scale(self) -> float:
-        """Size of its displacements at the contacts, m: what rounding is relative to."""
+        """Size of the displacements at the contacts, m; rounding errors are relative to it."""
         steady = self.force / np.hypot(
             self.frequencies**2 - self.angular_frequency**2,
             2.0 * self.damping_ratios * self.frequencies * self.angular_frequency,
@@ -108,7 +108,7 @@ class ImpactingBody:
 
 
 def contacts_of(shapes: Iterable[Floats], numbers: Numbers, integers: Integers) -> tuple[Contact, ...]:
-    """Return the contacts of mass-normalised shapes by the parameters of a body's FMU."""
+    """Return the contacts of given mass-normalised shapes, from the parameters of a body's FMU."""
     found = []
     for k, shape in enumerate(shapes, start=1):
         position, restitution = (numbers[f"contact[{k}].{name}"] for name in ("position", "restitution"))

@@ -1,4 +1,4 @@
-"""One mass on a spring at the points of a sweep: equations.md 1."""
+"""Oscillators, one mass on a spring, at the points of a sweep: equations.md 1."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, contac
 
 
 class OscillatorPoints(BodyPoints):
-    """Oscillators: one mode, whose coordinate is the displacement."""
+    """Oscillators: the displacement is the coordinate of the only mode."""
 
     def in_state_coordinates(self) -> ModalPoints:
         """Return the points as modes, in the coordinates of their states: see `BodyPoints`."""
         columns, contacts = self.floats, self.stops
         mass, count = columns["mass"], len(columns["mass"])
         none, one = np.zeros(count), np.ones((1, count))
-        with np.errstate(all="ignore"):  # what is no number is refused by its body
+        with np.errstate(all="ignore"):  # the body itself rejects NaN parameters
             return ModalPoints(
                 stiffness=(columns["stiffness"] / mass)[None],
                 decay=(0.5 * columns["damping"] / mass)[None],
@@ -52,13 +52,13 @@ class OscillatorPoints(BodyPoints):
 
     @property
     def flaw(self) -> str:
-        """Whether it has no spring."""
+        """Whether the oscillator has no spring ("loose")."""
         return "" if self.floats["stiffness"] > 0.0 else "loose"
 
     def contact_shapes(self) -> Floats:
-        """Return 1 for each contact."""
+        """Return a shape of 1 for each contact."""
         return np.ones((self.stops, 1))
 
     def contact_masses(self) -> Floats:
-        """Return the mass for each contact, kg."""
+        """Return the mass at each contact, kg."""
         return np.full(self.stops, self.floats["mass"])

@@ -1,4 +1,4 @@
-"""Bodies of several modes at the points of a sweep: each kind of structure among them is found once."""
+"""Bodies of several modes at the points of a sweep: points of equal structure share one computation."""
 
 from __future__ import annotations
 
@@ -14,53 +14,53 @@ from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, Number
 from vibroimpact.fmus.errors import VibroimpactError
 
 OF_THE_RUN = ("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_")
-"""Beginnings of the names of parameters that change no mode."""
+"""Prefixes of parameter names that do not change the modes."""
 OF_A_STOP = (".position", ".restitution", ".yield_velocity")
-"""Ends of the names of parameters that change no mode."""
+"""Suffixes of parameter names that do not change the modes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """The modes of a chain or a beam."""
+    """Modes of a chain or a beam."""
 
     frequencies: Floats
-    """rad/s, shape (mode,)."""
+    """Natural angular frequencies, rad/s, shape (mode,)."""
     damping_ratios: Floats
-    """Shape (mode,)."""
+    """Damping ratios, shape (mode,)."""
     mass: float
-    """The modal mass, kg; 1 of a chain."""
+    """Modal mass, kg; 1 for a chain."""
     load: Floats
-    """Force on each mode over its mass, for 1 of each amplitude of the forcing, shape (mode, amplitude)."""
+    """Modal force over modal mass, per unit of each amplitude of the forcing, shape (mode, amplitude)."""
     held: Floats
-    """Likewise for a constant force of 1 N, shape (mode,)."""
+    """Modal force over modal mass of a constant force of 1 N, shape (mode,)."""
     observed: Floats
-    """Each shape at the point that is recorded, shape (mode,)."""
+    """Value of each shape at the recorded point, shape (mode,)."""
     contacts: Floats
-    """At each stop, shape (contact, mode)."""
+    """Value of each shape at each stop, shape (contact, mode)."""
     to_state: Floats
-    """From modes to the displacements that are the body's state, shape (element, mode)."""
+    """Matrix from modes to the displacements in the state, shape (element, mode)."""
     from_state: Floats
-    """From these back to modes, shape (mode, element)."""
+    """Inverse of `to_state`, shape (mode, element)."""
 
 
 class StructurePoints(BodyPoints):
-    """Structures: a subclass says how the parameters of one point become modes."""
+    """Chains and beams: a subclass computes the modes from the parameters of one point."""
 
     START: str
-    """Beginning of the names of start values: those of masses or of modes."""
+    """Prefix of the names of start values, which set masses or modes."""
 
     @abstractmethod
     def structure_of(self, numbers: Numbers) -> Structure | None:
-        """Return the modes of one point; None where damping couples them, or it is not tied to the ground."""
+        """Return the modes of one point; None if damping couples them, or nothing ties the body to the ground."""
 
     @property
     @abstractmethod
     def sizes(self) -> tuple[int, int, int]:
-        """Numbers of the modes, of the elements of a state, and of the amplitudes of the forcing."""
+        """Numbers of modes, of elements of a state, and of amplitudes of the forcing."""
 
     @cached_property
     def _kinds(self) -> tuple[tuple[Structure, ...], NDArray[np.int64]]:
-        """The different structures of the points, and which of them each point has, shape (point,)."""
+        """Distinct structures among the points, and the number of the structure of each point, shape (point,)."""
         names = [n for n in self.floats if not n.startswith(OF_THE_RUN) and not n.endswith(OF_A_STOP)]
         kinds, which = _different(np.stack([self.floats[name] for name in names]))
         return tuple(
@@ -68,12 +68,12 @@ class StructurePoints(BodyPoints):
         ), which
 
     def _structure_or_none(self, numbers: Numbers) -> Structure:
-        """Return the modes of one point; all NaN where there are none."""
+        """Return the modes of one point; all NaN if it has none."""
         try:
             with np.errstate(all="ignore"):
                 found = self.structure_of(numbers)
         except (VibroimpactError, ArithmeticError, ValueError):
-            return self._no_structure()  # its body says what is wrong
+            return self._no_structure()  # the body itself reports the problem
         return self._no_structure() if found is None else found
 
     def _no_structure(self) -> Structure:
@@ -87,7 +87,7 @@ class StructurePoints(BodyPoints):
         columns, (structures, which) = self.floats, self._kinds
 
         def each(*values: Floats) -> Floats:
-            """Of the structures, shape (..., mode): of the points, shape (..., mode, point)."""
+            """Return values of structures, each of shape (..., mode), for all points: shape (..., mode, point)."""
             return np.stack(values, axis=-1)[..., which]
 
         _, elements, loads = self.sizes
@@ -136,7 +136,7 @@ class StructurePoints(BodyPoints):
 
 
 def _different(numbers: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the different columns of a table, and which of them each column is."""
+    """Return the distinct columns of a table, and the number of the distinct column at each place."""
     if (numbers == numbers[:, :1]).all():
         return numbers[:, :1], np.zeros(numbers.shape[1], dtype=np.int64)
     kinds, which = np.unique(numbers, axis=1, return_inverse=True)

@@ -1,1 +1,1 @@
-"""What the operations of this package do on the command line: `fmu` prints and checks components."""
+"""Implementations of this package's operations on the command line: `fmu` prints and checks components."""

@@ -1,4 +1,4 @@
-"""What `vibroimpact fmu` does with components: list, build, check and export them."""
+"""Implementation of `vibroimpact fmu`: list, build, check and export components."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vibroimpact.fmus.terminal import note, say, wide_terminal
 
 
 def print_components(_: ListFmus) -> None:
-    """Show every component, its FMUs and what they run on."""
+    """Show every component, its FMUs and their platforms."""
     rows = table("Components", "<component", "<FMI", ">variables", "<platforms", "<file")
     for component in read_components():
         for version in FOLDERS:
@@ -53,11 +53,11 @@ def build_into(options: BuildFmus) -> None:
 
 
 def check_all(options: CheckFmus) -> None:
-    """Check FMUs, all of the package if none is named: refusals are raised, doubts and remarks are said.
+    """Check FMUs, by default all of the package: raise refusals, print doubts and remarks.
 
-    An FMU that will not run, with `strict` also one that may run wrong, raises ComponentFileError.
+    Raise ComponentFileError for an FMU that will not run; with `strict`, also for one that may run wrong.
     """
-    # loads fmpy, which an export needs not
+    # loads fmpy, which an export does not need
     from vibroimpact.fmus.packaging.check import check_fmu, kinds_of
     from vibroimpact.fmus.packaging.model_description import Grade
 
@@ -79,12 +79,12 @@ def check_all(options: CheckFmus) -> None:
 
 
 def _counted(number: int, noun: str) -> str:
-    """Return a number of things in words."""
+    """Return a number with its noun, in the plural where needed."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def export_user_law(law: Path | None, output: Path | None, given: Sequence[str]) -> Path:
-    """Write the FMU of a contact law of the user's; `given` are the options that it has no use for."""
+    """Write the FMU of a user's contact law; raise UsageError for `given`, options that a law does not have."""
     if law is None:
         raise UsageError("--law: expected the Python file of your law, got nothing. Add --law my_law.py.")
     if given:
@@ -101,7 +101,7 @@ def export_component(
     platform: str | None,
     **kinds: bool,
 ) -> Path:
-    """Write the FMU of a component, start values changed by `NAME=VALUE`."""
+    """Write the FMU of a component with the start values of `NAME=VALUE`."""
     path = output or Path(f"{component_name(component)}.fmu")
     starts = None if changes is None else dict(map(_start, changes))
     return export_fmu(

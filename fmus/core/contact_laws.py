@@ -1,4 +1,4 @@
-"""The contact laws that the core has, by name: its own table, of which descriptions of FMUs are made too."""
+"""The contact laws of the core by name, from the table in C that also generates the descriptions of FMUs."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class ContactLaw:
     Attributes
     ----------
     name : str
-        In scenes and in the enumeration ContactLaw of FMUs.
+        Name in scenes and in the enumeration ContactLaw of FMUs.
     number : int
-        Its value in that enumeration.
+        Value in the enumeration ContactLaw.
     stop : {"none", "rigid", "yielding"}
-        What there is at a port of this law: a rigid stop answers with an impulse, one that yields with a force.
+        Stop at a port of this law: a rigid stop answers with an impulse, a yielding one with a force.
     external : bool
         Whether another FMU answers for the stop, or hits the point.
     """
@@ -53,7 +53,7 @@ def contact_laws() -> dict[str, ContactLaw]:
 
 
 def contact_law(name: str) -> ContactLaw:
-    """Return the contact law of a name.
+    """Return the contact law with this name.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def contact_law(name: str) -> ContactLaw:
 
 
 def numbered_contact_law(number: int) -> ContactLaw:
-    """Return the contact law of a number of the enumeration ContactLaw.
+    """Return the contact law with this number in the enumeration ContactLaw.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def numbered_contact_law(number: int) -> ContactLaw:
 
 @cache
 def rigid_law_numbers() -> frozenset[int]:
-    """Return the numbers of the laws by which a stop answers with a coefficient of restitution, and no force."""
+    """Return the numbers of the laws whose stop answers with a coefficient of restitution, not with a force."""
     return frozenset(
         law.number for law in contact_laws().values() if law.stop == "rigid" and not law.external
     )

@@ -1,4 +1,4 @@
-"""The door to the C function that counts near pairs of delay vectors: exact, all embeddings in one pass."""
+"""Interface of the C function that counts near pairs of delay vectors: exact, all embeddings in one pass."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ Array = NDArray[np.float64]
 RADII_PER_OCTAVE = 8
 MOST_RADII = 126
 MOST_EMBEDDING = 16
-# Below these many pairs a second thread costs more than it saves.
+# Number of pairs below which a second thread costs more than it saves.
 _WORTH_A_THREAD = 2_000_000
 
 
 def radius_ladder(lowest: float, highest: float) -> Array:
     """Return the radii 2^e (1 + k/8) from the last one <= `lowest` to the first one >= `highest`.
 
-    Eight to the octave, and none of them rounded: the leading bits of a distance tell between which two it lies.
+    There are eight radii an octave, exact in floating point: the leading bits of a distance give its place among them.
 
     Raises
     ------
     UsageError
-        There would be more than 126 (15 octaves), or the ends are not 0 < lowest < highest.
+        The ladder would have more than 126 radii (15 octaves), or not 0 < lowest < highest.
 
     Examples
     --------
@@ -54,23 +54,23 @@ def radius_ladder(lowest: float, highest: float) -> Array:
 def near_pairs(
     values: Array, radii: Array, embedding: int, *, window: int = 0, threads: int | None = None
 ) -> NDArray[np.int64]:
-    """Return how many pairs of delay vectors are nearer than each radius, in every embedding.
+    """Return the number of pairs of delay vectors nearer than each radius, in every embedding.
 
-    Counted are pairs i < j with j - i > `window` and max_{a < m} |x_{i+a} - x_{j+a}| < radius (thesis 5.4.2, with the
-    max norm): no vector with itself, no pair twice.
+    Counted are the pairs i < j with j - i > `window` and max_{a < m} |x_{i+a} - x_{j+a}| < radius: thesis 5.4.2, with
+    the max norm. No vector is paired with itself, and no pair counts twice.
 
     Parameters
     ----------
     values : ndarray of float, shape (n,)
-        x; NaN where vectors must not reach over.
+        x; NaN marks a gap that no vector may cross.
     radii : ndarray of float, shape (radius,)
         From `radius_ladder`.
     embedding : int
         Largest m, 1 to 16.
     window : int
-        Theiler's: pairs so near in their order do not count; 0: all do.
+        Theiler's window: pairs at most this far apart in order do not count; 0: all pairs count.
     threads : int, optional
-        As many as there are processors, at most 8, when not given.
+        Number of threads; by default the number of processors, at most 8.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def near_pairs(
 
 
 def _tables(values: Array, radii: Array, embedding: int, first: int, step: int) -> NDArray[np.uint64]:
-    """Return pairs by the classes of their distances in two successive embeddings, for every `step`-th lag."""
+    """Return numbers of pairs by the classes of their distances in two successive embeddings, every `step`-th lag."""
     library = core_library()
     library.vi_door_correlation_padding.restype = ctypes.c_size_t
     library.vi_door_correlation_tables.restype = ctypes.c_size_t
@@ -121,14 +121,14 @@ def _tables(values: Array, radii: Array, embedding: int, first: int, step: int) 
 
 
 def _marginals(tables: NDArray[np.uint64], embedding: int) -> NDArray[np.int64]:
-    # class k: at least k radii are not larger than the distance, so k <= j means nearer than radius j
+    # class k: at least k radii are <= the distance; so k <= j means nearer than radius j
     odd, even = tables.sum(axis=1), tables.sum(axis=2)
     by_embedding = np.stack([odd, even], axis=1).reshape(-1, tables.shape[1])[:embedding]
     return np.cumsum(by_embedding, axis=1)[:, :-1].astype(np.int64)
 
 
 def _step(radius: float, *, up: bool) -> int:
-    """Return the number of the last radius of the endless ladder <= a given one, or of the first >= it; 0 is 1."""
+    """Return the number of the last ladder radius <= a given one, or of the first one >= it; 0 is radius 1."""
     fraction, exponent = math.frexp(radius)
     place = (2.0 * fraction - 1.0) * RADII_PER_OCTAVE
     return (exponent - 1) * RADII_PER_OCTAVE + (math.ceil(place) if up else math.floor(place))

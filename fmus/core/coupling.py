@@ -1,4 +1,4 @@
-"""Coupled components between two moments that are an importer's: the loop over their steps and events, in C."""
+"""Coupled components between two actions of an importer: the loop over their steps and events, in C."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.fmus.core.library import core_library
 
 
 class CouplingEnd(IntEnum):
-    """Why `advance_coupled` has returned; `door/coupling.h` says more."""
+    """Reason why `advance_coupled` has returned; see `door/coupling.h`."""
 
     done = 0
     listen = 1
@@ -23,7 +23,7 @@ class CouplingEnd(IntEnum):
 
 
 class CallKind(IntEnum):
-    """What a call is."""
+    """Kind of a call of an FMU."""
 
     plain = 0
     move3 = 1
@@ -37,7 +37,7 @@ class CallKind(IntEnum):
 
 
 class CouplingCall(Structure):
-    """A call of an FMU with its arguments; `door/coupling.h` says what each field is."""
+    """A call of an FMU with its arguments; the fields are explained in `door/coupling.h`."""
 
     _fields_ = [
         *((name, c_void_p) for name in ("function", "instance", "references")),
@@ -59,7 +59,7 @@ class CouplingCalls(Structure):
 
 
 class CouplingComponent(Structure):
-    """A component, by its calls; `door/coupling.h` says what each field is."""
+    """A component, by its calls; the fields are explained in `door/coupling.h`."""
 
     _fields_ = [
         ("step", CouplingCall),
@@ -72,7 +72,7 @@ class CouplingComponent(Structure):
 
 
 class CouplingPlan(Structure):
-    """What is done in all runs; `door/coupling.h` says what each field is."""
+    """The plan, common to all runs; the fields are explained in `door/coupling.h`."""
 
     _fields_ = [
         ("components", POINTER(CouplingComponent)),
@@ -87,18 +87,18 @@ class CouplingPlan(Structure):
 
 
 class CouplingProgress(Structure):
-    """How far a run is; times in s.
+    """Progress of a run; times in s.
 
     Attributes
     ----------
     time : float
         Time reached.
     grid_start, next_point, grid_index
-        The start of the grid of communication points, the next of them, and its index.
+        Start of the grid of communication points, the next point of the grid, and its index.
     event_time, event_index
-        Time of the last event, and its index among those at that time.
+        Time of the last event, and its index among the events of this time.
     standstill, steps, repeated_steps : int
-        Communication steps made without progress, all that were made, and how many were repeated.
+        Numbers of communication steps: without progress, in total, and repeated.
     """
 
     _fields_ = [
@@ -108,7 +108,7 @@ class CouplingProgress(Structure):
 
 
 class CouplingRun(Structure):
-    """One call of the loop; `door/coupling.h` says what each field is."""
+    """One call of the loop; the fields are explained in `door/coupling.h`."""
 
     _fields_ = [
         *((name, c_double) for name in ("end", "macro_step", "most_seconds")),
@@ -129,20 +129,20 @@ def _function() -> Any:
 
 
 def advance_coupled(plan: CouplingPlan, progress: CouplingProgress, run: CouplingRun) -> CouplingEnd:
-    """Advance components to `run.end` by their own functions, without Python in between; other threads go on meanwhile.
+    """Advance components to `run.end` by their own functions, without Python in between; other threads may run then.
 
     Parameters
     ----------
     plan : CouplingPlan
-        The components, and what is done with them.
+        The components and their calls.
     progress : CouplingProgress
-        It is brought up to where they came.
+        Progress of the run, which the call updates.
     run : CouplingRun
 
     Returns
     -------
     CouplingEnd
-        `listen`: it has taken `most_seconds`; after `stepped` and `reached` the caller finishes the step; `failed`: a
-        call has; `endless`: the events do not settle; `cut`: a component takes steps of another size.
+        `listen`: `most_seconds` have passed. `stepped`, `reached`: the caller finishes the step. `failed`: a call
+        failed. `endless`: the events do not settle. `cut`: a component takes steps of another size.
     """
     return CouplingEnd(_function()(plan, progress, run))

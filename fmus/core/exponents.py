@@ -1,4 +1,4 @@
-"""Lyapunov exponents of a motion from its impacts, in C: what flights and impacts stretch a change of the state by."""
+"""Lyapunov exponents of a motion from its impacts, in C: the stretching of small changes by flights and impacts."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class _Run(Structure):
 
 
 class Stretching:
-    """Directions that go along with a motion from impact to impact, and what they are stretched by.
+    """Directions carried along a motion from impact to impact, and their stretching.
 
     Parameters
     ----------
     body : OrbitBody
     contacts, phases, velocities : array, shape (impacts,)
-        Contact of each impact, from 0; forcing phase, rad; speed towards the stop before it, m/s, > 0.
+        Contact of each impact, from 0; forcing phase, rad; speed towards the stop before the impact, m/s, > 0.
     elapsed : array, shape (impacts,)
-        From the impact before, s.
+        Time since the impact before, s.
     state : array, shape (2 modes,)
-        Modal displacements and velocities after the first impact; what is wrong of them decays with the modes.
+        Modal displacements and velocities after the first impact; an error in them decays with the modes.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class Stretching:
         self._directions = np.eye(2 * body.modes)
 
     def along(self, first: int, last: int) -> Array:
-        """Go on along impacts `first` to `last` - 1; return the logarithms of what directions are stretched by.
+        """Continue along impacts `first` to `last` - 1; return the logarithms of the stretching of each direction.
 
         Raises
         ------
         UsageError
-            The impacts are none of the body.
+            The body has no such impacts.
         """
         stretch = np.zeros(2 * self._body.modes)
         arrays = (each.ctypes.data for each in (self._state, self._directions, stretch))

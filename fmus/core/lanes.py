@@ -22,7 +22,7 @@ CHOICE = "VIBROIMPACT_INSTRUCTIONS"
 
 
 class LanesEnd(IntEnum):
-    """Why `run_lanes` has returned; `lanes/lanes.h` says more."""
+    """Reason why `run_lanes` has returned; see `lanes/lanes.h`."""
 
     done = 0
     listen = 1
@@ -31,7 +31,7 @@ class LanesEnd(IntEnum):
 
 
 class PointState(IntEnum):
-    """How far a point is."""
+    """Progress of a point."""
 
     waits = 0
     runs = 1
@@ -41,7 +41,7 @@ class PointState(IntEnum):
 
 
 class Instructions(IntEnum):
-    """Instruction sets that the lanes are compiled for; `best` is what the machine has."""
+    """Instruction sets that the lanes are compiled for; `best` is the best one of the machine."""
 
     best = 0
     baseline = 1
@@ -50,7 +50,7 @@ class Instructions(IntEnum):
 
 
 class LanesPlan(Structure):
-    """What all points have in common; `lanes/lanes.h` says what each field is."""
+    """The plan, common to all points; the fields are explained in `lanes/lanes.h`."""
 
     _fields_ = [
         *((name, c_int32) for name in ("modes", "contacts", "impacts", "extrema", "periods", "instructions")),
@@ -59,7 +59,7 @@ class LanesPlan(Structure):
 
 
 class LanesPoints(Structure):
-    """The points, and what they come to; `lanes/lanes.h` says what each field is."""
+    """The points and their results; the fields are explained in `lanes/lanes.h`."""
 
     GIVEN = (
         "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "observed",
@@ -90,16 +90,16 @@ def _functions() -> tuple[Any, Any, Any]:
 
 
 def instructions() -> Instructions:
-    """Return the instruction set that lanes run with: the best of this machine, or `$VIBROIMPACT_INSTRUCTIONS`.
+    """Return the instruction set of the lanes: `$VIBROIMPACT_INSTRUCTIONS`, by default the best of this machine.
 
     Raises
     ------
     UsageError
-        The variable names none, or one that this machine does not have.
+        The variable names an unknown instruction set, or one that this machine lacks.
     """
     chosen = os.environ.get(CHOICE) or "best"
-    wanted = Instructions.__members__.get(chosen)
-    found = 0 if wanted is None else _functions()[2](wanted)
+    instruction_set = Instructions.__members__.get(chosen)
+    found = 0 if instruction_set is None else _functions()[2](instruction_set)
     if not found:
         has = [name for name, each in Instructions.__members__.items() if each and _functions()[2](each)]
         raise UsageError(f"{CHOICE}: expected one that this machine has ({', '.join(has)}), got {chosen!r}.")
@@ -107,12 +107,12 @@ def instructions() -> Instructions:
 
 
 def lanes_memory(plan: LanesPlan) -> NDArray[np.uint8]:
-    """Return memory for what is under way between two calls, for points that have not begun.
+    """Return memory for runs in progress between two calls, for points that have not begun.
 
     Raises
     ------
     UsageError
-        The plan has too many modes or contacts, or an instruction set that this machine does not have.
+        The plan has too many modes or contacts, or an instruction set that this machine lacks.
     """
     size = _functions()[1](plan)
     if size == 0:
@@ -124,20 +124,21 @@ def lanes_memory(plan: LanesPlan) -> NDArray[np.uint8]:
 
 
 def run_lanes(plan: LanesPlan, points: LanesPoints, memory: NDArray[np.uint8]) -> LanesEnd:
-    """Run what is left of the points, without Python in between; other threads go on meanwhile.
+    """Run the remaining points, without Python in between; other threads can run meanwhile.
 
     Parameters
     ----------
     plan : LanesPlan
     points : LanesPoints
-        They are filled as far as the runs came.
+        Filled as far as the runs came.
     memory : ndarray of uint8
-        Of `lanes_memory`: with these points, from their first call to their last.
+        Memory from `lanes_memory`, kept with these points from their first call to their last.
 
     Returns
     -------
     LanesEnd
-        `listen`: it has taken `most_seconds`; `full`: there is no room for more rows; `left`: what has not run is left
-        for the scalar engine, or waits for such a point of its branch. After each of them another call goes on.
+        `listen`: `most_seconds` have passed. `full`: there is no room for more rows. `left`: the points that have not
+        run need the scalar engine, or wait for such a point of their branch. After each of these another call
+        continues.
     """
     return LanesEnd(_functions()[0](plan, points, memory.ctypes.data))

@@ -17,7 +17,7 @@ def core_library() -> ctypes.CDLL:
     Raises
     ------
     ComponentError
-        It is not built.
+        The library is not built.
     """
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     path = package_folder() / "built" / f"libvibroimpact_core{suffix}"

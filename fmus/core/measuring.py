@@ -15,13 +15,13 @@ from vibroimpact.fmus.errors import UsageError
 
 Array = NDArray[np.float64]
 
-#: Sides of a body on which an exciter may be, each with its number in the FMU.
+#: Sides of a body where an exciter may be, each with its number in the FMU.
 EXCITER_SIDES = {"lower": 1, "upper": 2}
 MOST_BITS = 32
-#: Largest numbers of a load cell: Hz, 1, s; and the least but 0.
+#: Upper limits of a load cell's parameters (Hz, 1, s), and the smallest value besides 0.
 CELL_LIMITS = {"natural_frequency": 1e7, "damping_ratio": 1e3, "contact_duration": 1e3}
 CELL_LEAST = 1e-9
-#: Relative rounding by which an impact may lie before or after a block.
+#: Relative rounding error by which an impact may lie before or after a block.
 _SAME_INSTANT = 1e-12
 
 
@@ -40,24 +40,24 @@ class _Settings(ctypes.Structure):
 
 
 class LoadCell:
-    """A load cell: a voltage of the force on it, with the ring of the cell.
+    """A load cell: its output voltage for the force on it, with the oscillation of the cell.
 
     y'' + 2 damping_ratio w y' + w^2 y = w^2 force, w = 2 pi natural_frequency; the output is
-    sensitivity y + offset + drift time. An impact on a rigid stop is a half sine that begins with it and has its
-    impulse: the peak is pi impulse / (2 contact_duration).
+    sensitivity y + offset + drift time. An impact on a rigid stop becomes a half sine, which starts at the impact and
+    has its impulse. The peak is pi impulse / (2 contact_duration).
 
     Parameters
     ----------
     sensitivity : float
-        V/N.
+        Sensitivity, V/N.
     natural_frequency : float
-        Hz, 0 or 1e-9 to 1e7; 0: the cell does not ring, y is the force.
+        Hz, 0 or 1e-9 to 1e7; 0: the cell does not oscillate, and y is the force.
     damping_ratio : float
         0 to 1000.
     offset, drift : float
-        Zero of the output, V, and how it goes on from time 0, V/s.
+        Output for no force at time 0, V, and its rate of change, V/s.
     contact_duration : float
-        Of an impact, s, 0 or 1e-9 to 1000; 0: no impacts come.
+        Duration of an impact, s, 0 or 1e-9 to 1000; 0: the cell takes no impacts.
 
     Raises
     ------
@@ -99,37 +99,37 @@ class LoadCell:
 
     @property
     def time(self) -> float | None:
-        """End of the last block, s; None before the first."""
+        """End of the last block, s; None before the first block."""
         return self._reached
 
     def follow(
         self, times: ArrayLike, forces: ArrayLike, impact_times: ArrayLike = (), impulses: ArrayLike = ()
     ) -> Array:
-        """Return the output at instants, going on from the block before.
+        """Return the output at given instants, continuing from the block before.
 
-        Exact for a force that goes straight between the instants, and from the last of the block before. The first
-        block begins at its first instant or impact, settled under its first force.
+        The output is exact for a force that is linear between the instants, also from the last instant of the block
+        before. The first block begins at its first instant or impact, in equilibrium with its first force.
 
         Parameters
         ----------
         times : array_like, shape (sample,)
-            s, ascending, not before the block before has ended.
+            s, ascending, not before the end of the block before.
         forces : array_like, shape (sample,)
-            On the cell at these instants, N, without impacts.
+            Forces on the cell at these instants, N, without impacts.
         impact_times, impulses : array_like, shape (impact,)
-            Instants of impacts on a rigid stop, s, ascending, between the end of the block before and that of this one;
-            what they gave, N s.
+            Instants of impacts on a rigid stop, s, ascending, after the block before and not after the end of this
+            block; impulses, N s.
 
         Returns
         -------
         ndarray, shape (sample,)
-            V.
+            Output, V.
 
         Raises
         ------
         UsageError
-            Numbers that are not finite, instants out of order, an impact outside of the block, impacts where
-            contact_duration is 0, or more than 2048 within one contact_duration (the cell is then of no further use).
+            A number is not finite, instants are out of order, an impact is outside of the block, or impacts come with
+            contact_duration 0. More than 2048 impacts are within one contact_duration: the cell is of no further use.
         """
         at, force = _row("LoadCell: times", times), _row("LoadCell: forces", forces)
         hits, impulse = _row("LoadCell: impact_times", impact_times), _row("LoadCell: impulses", impulses)
@@ -183,16 +183,16 @@ class LoadCell:
 
 
 def gaussian(seed: int, channel: int, first: int, count: int) -> Array:
-    """Return Gaussian numbers of mean 0 and variance 1 that depend on their place alone.
+    """Return Gaussian numbers of mean 0 and variance 1 that depend only on their place in a sequence.
 
-    The same bits on every machine, however many are asked for at once.
+    They have the same bits on every machine, and for any length of the calls.
 
     Parameters
     ----------
     seed, channel : int
-        0 to 2^64 - 1; each pair has a sequence of its own.
+        0 to 2^64 - 1; each pair has its own sequence.
     first, count : int
-        Of the sequence, >= 0.
+        First place in the sequence, and number of places, >= 0.
 
     Returns
     -------
@@ -218,16 +218,16 @@ def gaussian(seed: int, channel: int, first: int, count: int) -> Array:
 
 
 def digitised(volts: ArrayLike, highest: float, bits: int) -> Array:
-    """Return what an analog-to-digital converter leaves of voltages.
+    """Return voltages as rounded by an analog-to-digital converter.
 
     Parameters
     ----------
     volts : array_like, shape (sample,)
-        V.
+        Voltages, V.
     highest : float
-        The range is +-highest, V, > 0.
+        End of the range +-highest, V, > 0.
     bits : int
-        1 to 32.
+        Number of bits, 1 to 32.
 
     Returns
     -------
@@ -254,21 +254,21 @@ def digitised(volts: ArrayLike, highest: float, bits: int) -> Array:
 
 
 def sensor_reading(values: ArrayLike, gain: float, offset: float = 0.0, highest: float = 0.0) -> Array:
-    """Return gain * value + offset, ended at +-highest.
+    """Return gain * value + offset, clipped at +-highest.
 
     Parameters
     ----------
     values : array_like, shape (sample,)
-        In the unit of the sensor.
+        Values in the unit of the sensor.
     gain, offset : float
         V per unit, V.
     highest : float
-        V, >= 0; 0: the reading has no end.
+        Limit of the reading, V, >= 0; 0: no limit.
 
     Returns
     -------
     ndarray, shape (sample,)
-        V; NaN stays NaN.
+        Readings, V; NaN stays NaN.
 
     Raises
     ------
@@ -304,20 +304,20 @@ def exciter_force(
     Parameters
     ----------
     volts : array_like, shape (sample,)
-        V.
+        Drive voltages, V.
     displacement : array_like, shape (sample,)
-        Of the body where the force acts, m; one number for all is enough.
+        Displacement of the body at the force, m; a single number holds for all samples.
     gain, offset : float
         N/V and N, at displacement 0.
     distance : float
-        Between body and exciter at displacement 0, m, >= 0; 0: the force does not depend on it.
+        Distance between body and exciter at displacement 0, m, >= 0; 0: the force does not depend on the displacement.
     side : str
-        `lower`: below the body, nearer where the displacement is negative; or `upper`.
+        `lower`: the exciter is below the body, nearer for negative displacements; or `upper`.
 
     Returns
     -------
     ndarray, shape (sample,)
-        N.
+        Forces, N.
 
     Raises
     ------

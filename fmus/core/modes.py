@@ -1,4 +1,4 @@
-"""Modes of beams and chains, found by the same C functions as the FMUs use: equations.md 5 and 6."""
+"""Modes of beams and chains, from the same C functions as in the FMUs: equations.md 5 and 6."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ Array = npt.NDArray[np.float64]
 Numbers = Sequence[float] | Array
 Boundary = Literal["clamped_free", "clamped_clamped", "clamped_pinned", "pinned_pinned"]
 
-#: The ends of a beam, each with the number that the FMU's enumeration BeamBoundary gives it.
+#: Boundaries of a beam, each with its number in the FMU's enumeration BeamBoundary.
 BOUNDARIES: dict[Boundary, int] = {name: number for number, name in enumerate(get_args(Boundary), 1)}
 HIGHEST_DERIVATIVE = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamModes:
-    """The first modes of an Euler-Bernoulli beam, on the length 0 <= s = x / L <= 1.
+    """The first modes of an Euler-Bernoulli beam, over the length 0 <= s = x / L <= 1.
 
     Shapes have unit mean square over the length, so that every modal mass is the beam's mass.
 
     Attributes
     ----------
     boundary : str
-        The ends, s = 0 first.
+        Supports of both ends, s = 0 first.
     eigenvalues : array, shape (count,)
         xi_j: natural angular frequency = xi_j^2 sqrt(E I / (mass_per_length L^4)); thesis table 7.1.
     participation : array, shape (count,)
@@ -49,19 +49,19 @@ class BeamModes:
         Parameters
         ----------
         points : float or array of floats
-            s, 0 to 1.
+            Places s, 0 to 1.
         derivative : int
-            Order 0 to 3.
+            Order of the derivative, 0 to 3.
 
         Returns
         -------
         array, shape (number of points, count)
-            To some 1e-15 xi_j^derivative, in every mode; the tip of a clamped-free beam is exactly +-2.
+            Errors are about 1e-15 xi_j^derivative, in every mode; the tip of a clamped-free beam is exactly +-2.
 
         Raises
         ------
         UsageError
-            A point outside of the beam, or another derivative.
+            A point is outside of the beam, or the order is none of 0 to 3.
 
         Examples
         --------
@@ -102,7 +102,7 @@ def beam_modes(boundary: Boundary, count: int) -> BeamModes:
     Raises
     ------
     UsageError
-        Another boundary, or no mode.
+        The boundary is unknown, or the count is below 1.
 
     Examples
     --------
@@ -124,14 +124,14 @@ def beam_modes(boundary: Boundary, count: int) -> BeamModes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualVectors:
-    """What a beam's first modes leave out under forces at some points, as shapes orthogonal to those modes."""
+    """Static remainder of a beam's first modes under forces at given points, as shapes orthogonal to these modes."""
 
     boundary: Boundary
-    """The ends, s = 0 first."""
+    """Supports of both ends, s = 0 first."""
     natural: int
-    """Modes that are kept."""
+    """Number of natural modes that are kept."""
     points: Array
-    """s of the forces, shape (point,)."""
+    """Places s of the forces, shape (point,)."""
     eigenvalues: Array
     """xi, ascending, shape (point,): natural angular frequency = xi^2 sqrt(E I / (mass_per_length L^4))."""
     participation: Array
@@ -140,7 +140,7 @@ class ResidualVectors:
     def shapes(self, points: float | Numbers) -> Array:
         """Return the shapes, of unit mean square over the length, at points s, 0 to 1; shape (number of points, point).
 
-        UsageError: a point is outside of the beam.
+        Raise UsageError for a point outside of the beam.
         """
         s = _row(points)
         values = np.empty((s.size, self.points.size))
@@ -152,11 +152,11 @@ class ResidualVectors:
 
 
 def residual_vectors(boundary: Boundary, natural: int, points: float | Numbers) -> ResidualVectors:
-    """Return what the first modes of a beam leave out under forces at some points: equations.md 6.6.
+    """Return the static remainder of a beam's first modes under forces at given points: equations.md 6.6.
 
-    With them a beam yields to static forces there as much as with all its modes. At least one natural mode is kept. The
-    forces act at most at 8 points s, not on a support, no two the same; s = 0 is the first end that the boundary names.
-    UsageError: another boundary, no mode, or points that cannot be told apart.
+    With these shapes the beam's static compliance at the points is that of all its modes. At least one natural mode is
+    kept. There are at most 8 points s, all distinct and not on a support; s = 0 is the first end of the boundary.
+    Raise UsageError for an unknown boundary, no mode, or points that are numerically equal.
 
     Examples
     --------
@@ -190,11 +190,11 @@ class ChainModes:
     frequencies : array, shape (masses,)
         Natural angular frequencies, ascending, rad/s.
     damping_ratios : array, shape (masses,)
-        Where the damping couples the modes, those of its diagonal.
+        Damping ratios; the diagonal terms alone where the damping couples the modes.
     shapes : array, shape (masses, masses)
         Displacement of each mass (rows) for a unit of each mode, kg^(-1/2).
     is_classical : bool
-        Whether the damping does not couple the modes.
+        Whether the damping leaves the modes uncoupled.
     """
 
     frequencies: Array
@@ -209,14 +209,14 @@ def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> Cha
     Parameters
     ----------
     masses : array of floats, shape (masses,)
-        kg, > 0; 1 to 64 of them.
+        kg, > 0; 1 to 64 masses.
     stiffnesses, dampings : array of floats, shape (masses + 1,)
         N/m and N s/m, >= 0; the last ties the far end to the ground.
 
     Raises
     ------
     UsageError
-        Numbers that no chain has.
+        The numbers describe no chain.
 
     Examples
     --------

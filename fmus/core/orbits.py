@@ -1,4 +1,4 @@
-"""Periodic orbits of bodies that hit restitution stops, in C: what belongs to the phases of their impacts."""
+"""Periodic orbits of bodies with restitution stops, in C: velocities and distances for given phases of the impacts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_IMPACTS = 64
 
 
 class OrbitEnd(IntEnum):
-    """What a call ended with; `door/orbits.h` says more."""
+    """Reason why a call ended; see `door/orbits.h`."""
 
     done = 0
     refused = 1
@@ -28,7 +28,7 @@ class OrbitEnd(IntEnum):
 
 
 class BODY(Structure):
-    """A body as C has it; `door/orbit_response.h` says what each field is."""
+    """A body as C stores it; the fields are explained in `door/orbit_response.h`."""
 
     ARRAYS = (
         *("natural", "damping_ratio", "cosine", "sine", "held"),
@@ -47,18 +47,18 @@ class _Train(Structure):
 
 
 class OrbitBody:
-    """A body of mass-normalised modes with restitution stops, as the C functions take it.
+    """A body of mass-normalised modes with restitution stops, in the form that the C functions take.
 
     Parameters
     ----------
     angular_frequency : float
-        Of the force, rad/s.
+        Angular frequency of the force, rad/s.
     natural, damping_ratio, cosine, sine, held : array, shape (modes,)
         Natural angular frequencies (rad/s), damping ratios, modal force = cosine cos(phase) + sine sin(phase) + held.
     shape, impulse : array, shape (contacts, modes)
-        Displacement of each contact for unit modal displacements; modal velocities that a unit of velocity there takes.
+        Displacement of each contact for unit modal displacements; modal velocities that give the contact 1 m/s.
     direction, position, restitution : array, shape (contacts,)
-        +1 for a stop above, -1 below; m; coefficient.
+        +1 for a stop above, -1 below; position, m; coefficient of restitution.
     """
 
     def __init__(self, angular_frequency: float, **arrays: Array) -> None:
@@ -68,16 +68,16 @@ class OrbitBody:
         self.address = BODY(self.modes, contacts, angular_frequency, *addresses)
 
     def evaluate(self, contacts: NDArray[np.int32], phases: Array, periods: int) -> Evaluation:
-        """Return what belongs to the phases of the impacts: equations.md 4.7.
+        """Return velocities and distances for given phases of the impacts: equations.md 4.7.
 
         Parameters
         ----------
         contacts : array, shape (impacts,)
-            Contact of each, from 0.
+            Contact of each impact, from 0.
         phases : array, shape (impacts,)
             rad, ascending, within 2 pi `periods`.
         periods : int
-            Of the force in the orbit.
+            Forcing periods in the orbit.
         """
         n = phases.size
         train = _train(contacts, phases, periods)
@@ -101,7 +101,7 @@ class OrbitBody:
     def maximum(
         self, contacts: NDArray[np.int32], phases: Array, periods: int, states: Array
     ) -> tuple[float, float, int]:
-        """Return how far the highest maximum between impacts is beyond its stop (m), its phase, its contact or -1."""
+        """Return the highest maximum between impacts: its depth beyond the stop (m), phase, and contact (-1: none)."""
         train = _train(contacts, phases, periods)
         what, known = np.empty(3), _numbers(states, (phases.size, 2 * self.modes))
         _check(_library().vi_door_orbit_maximum(self.address, train, known.ctypes.data, what.ctypes.data))
@@ -110,14 +110,14 @@ class OrbitBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """What belongs to the phases of a train of impacts.
+    """Velocities and distances for given phases of the impacts.
 
     Attributes
     ----------
     end : OrbitEnd
-        Numbers are there where it is `done`.
+        The arrays are valid if `end` is `done`.
     velocities, distances : array, shape (impacts,)
-        Speeds towards the stops before the impacts, m/s; how far beyond the stops these are, m: 0 of an orbit.
+        Speeds towards the stops before the impacts, m/s; distances beyond the stops, m: 0 for an orbit.
     distance_slopes, velocity_slopes : array, shape (impacts, impacts)
         Derivatives over the phase of each impact (columns).
     """
@@ -137,12 +137,12 @@ def _train(contacts: NDArray[np.int32], phases: Array, periods: int) -> _Train:
             f"orbit: expected a phase and a contact of each impact, got {phase.shape} and {contact.shape}."
         )
     train = _Train(phase.size, periods, contact.ctypes.data, phase.ctypes.data)
-    train.kept = contact, phase  # alive as long as the train
+    train.kept = contact, phase  # keeps the arrays alive as long as the train
     return train
 
 
 def _numbers(array: Array, shape: tuple[int, ...]) -> Array:
-    """Return an array as C reads it."""
+    """Return an array in the layout that C reads."""
     found = np.ascontiguousarray(array, dtype=np.float64)
     if found.shape != shape:
         raise UsageError(f"orbit: expected numbers of shape {shape}, got {found.shape}.")
@@ -158,7 +158,7 @@ def _check(end: int) -> None:
 def _library() -> ctypes.CDLL:
     library = core_library()
     body, train = POINTER(BODY), POINTER(_Train)
-    # addresses: what converts arrays is Python code, in which Ctrl-C would become an error of an argument
+    # plain addresses: converting arrays runs Python code, where Ctrl-C would turn into an error of an argument
     library.vi_door_orbit.argtypes = [body, train, *[c_void_p] * 4]
     library.vi_door_orbit_motion.argtypes = [body, train, *[c_void_p] * 3]
     library.vi_door_orbit_maximum.argtypes = [body, train, *[c_void_p] * 2]

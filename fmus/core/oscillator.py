@@ -1,6 +1,6 @@
-"""A forced oscillator with a stop: flow, next contact and motion, by the C functions that its FMU is made of.
+"""A forced oscillator with a stop: flow, next contact and motion, by the C functions of its FMU.
 
-Analyses fit and follow orbits with these, never with a second implementation of the physics.
+Analyses fit and follow orbits with these functions; the physics has no second implementation.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Oscillator:
     amplitude : float
         Force amplitude, N.
     angular_frequency : float
-        Of the force, rad/s; 0: a constant force.
+        Angular frequency of the force, rad/s; 0: a constant force.
     """
 
     mass: float = 1.0
@@ -51,7 +51,7 @@ class Oscillator:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A contact found: seconds from now, and the speed of approach (m/s)."""
+    """A contact: seconds from now, and the speed of approach (m/s)."""
 
     time: float
     velocity: float
@@ -98,12 +98,12 @@ def flow(
     phase : float
         Forcing phase now, rad.
     held, held_rate : float
-        A further acceleration held + held_rate * time, m/s^2 and m/s^3.
+        Further acceleration held + held_rate * time, m/s^2 and m/s^3.
 
     Raises
     ------
     UsageError
-        An argument is not finite, or out of its range.
+        An argument is not finite or out of its range.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def next_contact(
 ) -> Contact | None:
     """Return the first contact with a stop within `duration` s, or None: equations.md 2, certified.
 
-    Parameters are those of `flow`; `position` (m) and `side` ("upper", "lower") are the stop's.
+    The parameters are those of `flow`, and the stop's `position` (m) and `side` ("upper", "lower").
 
     Examples
     --------
@@ -168,15 +168,15 @@ def motion(
     Parameters
     ----------
     oscillator, state, phase
-        As in `flow`.
+        See `flow`.
     instants : array_like, shape (sample,)
         Seconds from now, >= 0, ascending.
     position : float or None
-        Of the stop, m; None: there is none.
+        Position of the stop, m; None: no stop.
     side : str
-        `upper` or `lower`.
+        Side of the stop, `upper` or `lower`.
     restitution : float
-        0 to 1.
+        Coefficient of restitution, 0 to 1.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def motion(
     Raises
     ------
     UsageError
-        An argument is not finite, or out of its range.
+        An argument is not finite or out of its range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Many runs of one body by one call: the loop over the points of a chunk, in C."""
+"""Many runs of one body in one call: the loop over the points of a chunk, in C."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vibroimpact.fmus.core.library import core_library
 
 
 class RunsEnd(IntEnum):
-    """Why `run_points` has returned."""
+    """Reason why `run_points` has returned."""
 
     done = 0
     listen = 1
@@ -23,7 +23,7 @@ class RunsEnd(IntEnum):
 
 
 class RunsFmu(Structure):
-    """The functions of FMI 3.0 of one instance, as addresses; `log` is that of its `LogTail`."""
+    """Addresses of the FMI 3.0 functions of one instance; `log` is the address of its `LogTail`."""
 
     FUNCTIONS = (
         "Reset", "EnterInitializationMode", "ExitInitializationMode", "DoStep", "SetFloat64", "GetFloat64",
@@ -39,7 +39,7 @@ class RunsVariables(Structure):
 
 
 class RunsPlan(Structure):
-    """What all points have in common; `door/runs.h` says what each field is."""
+    """The plan, common to all points; the fields are explained in `door/runs.h`."""
 
     _fields_ = [
         *((name, RunsVariables) for name in ("parameters", "integers", "booleans")),
@@ -56,7 +56,7 @@ class RunsPlan(Structure):
 
 
 class RunsPoints(Structure):
-    """The points, and how far they are; `door/runs.h` says what each field is."""
+    """The points and their progress; the fields are explained in `door/runs.h`."""
 
     ARRAYS = (
         "values", "begin", "end", "first", "outcome", "reached", "seconds", "finals", "flags", "rows_of", "rows",
@@ -75,7 +75,7 @@ class RunsPoints(Structure):
 
 
 def address(array: NDArray[Any]) -> int:
-    """Return where the values of a contiguous array are."""
+    """Return the address of the values of a contiguous array."""
     if not array.flags.c_contiguous:
         raise ValueError("address: expected a contiguous array")
     return int(array.ctypes.data)
@@ -89,7 +89,7 @@ def _function() -> Any:
 
 
 def run_points(fmu: RunsFmu, plan: RunsPlan, points: RunsPoints) -> RunsEnd:
-    """Run what is left of the points, without Python in between; other threads go on meanwhile.
+    """Run the remaining points, without Python in between; other threads can run meanwhile.
 
     Parameters
     ----------
@@ -97,12 +97,12 @@ def run_points(fmu: RunsFmu, plan: RunsPlan, points: RunsPoints) -> RunsEnd:
         The instance; each of its runs begins with a reset.
     plan : RunsPlan
     points : RunsPoints
-        They are filled as far as the runs came.
+        Filled as far as the runs came.
 
     Returns
     -------
     RunsEnd
-        `listen`: it has taken `most_seconds`; `full`: there is no room for more rows; `refused`: the point `at` is for
-        the caller. After each of them another call goes on.
+        `listen`: `most_seconds` have passed. `full`: there is no room for more rows. `refused`: the caller must handle
+        the point `at`. After each of these another call continues.
     """
     return RunsEnd(_function()(fmu, plan, points))

@@ -1,4 +1,4 @@
-"""A block of samples of one body by one call, its force held between them: the loop over the samples, in C."""
+"""A block of samples of one body in one call, with the force held between samples: the loop over samples, in C."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.fmus.core.runs import RunsFmu, RunsVariables
 
 
 class HoldEnd(IntEnum):
-    """Why `hold_samples` has returned."""
+    """Reason why `hold_samples` has returned."""
 
     done = 0
     refused = 1
@@ -22,13 +22,13 @@ class HoldEnd(IntEnum):
 
 
 class Magnet(Structure):
-    """An exciter that makes a force of a voltage; `measuring/magnet.h` says what each field is."""
+    """An exciter that turns a voltage into a force; the fields are explained in `measuring/magnet.h`."""
 
     _fields_ = [*((name, c_double) for name in ("gain", "offset", "distance")), ("side", c_int32)]
 
 
 class HoldPlan(Structure):
-    """What all blocks have in common; `door/stepping.h` says what each field is."""
+    """The plan, common to all blocks; the fields are explained in `door/stepping.h`."""
 
     _fields_ = [
         ("force", c_uint32),
@@ -41,7 +41,7 @@ class HoldPlan(Structure):
 
 
 class HoldBlock(Structure):
-    """The samples, and how far they are; `door/stepping.h` says what each field is."""
+    """The samples and their progress; the fields are explained in `door/stepping.h`."""
 
     _fields_ = [
         ("count", c_int64),
@@ -62,7 +62,7 @@ def _function() -> Any:
 
 
 def hold_samples(fmu: RunsFmu, plan: HoldPlan, block: HoldBlock) -> HoldEnd:
-    """Take the samples of a block, without Python in between; other threads go on meanwhile.
+    """Take the samples of a block, without Python in between; other threads can run meanwhile.
 
     Parameters
     ----------
@@ -70,13 +70,12 @@ def hold_samples(fmu: RunsFmu, plan: HoldPlan, block: HoldBlock) -> HoldEnd:
         The instance; it does not record, or the plan says where.
     plan : HoldPlan
     block : HoldBlock
-        It is filled as far as the body came.
+        Filled as far as the body came.
 
     Returns
     -------
     HoldEnd
-        `refused`: the body failed in the step to the sample `at`; `limit`: it met its limit of impacts there;
-        `touches`: it touches its exciter; `again`: take the rows of the block, set `rows_used` to 0, and call again to
-        go on.
+        `refused`: the body failed in the step to the sample `at`. `limit`: it reached its limit of impacts there.
+        `touches`: it touches its exciter. `again`: take the rows of the block, set `rows_used` to 0, and call again.
     """
     return HoldEnd(_function()(fmu, plan, block))

@@ -1,4 +1,4 @@
-"""The words of arguments, and the class that declares an operation."""
+"""Descriptions of arguments, and the class that declares an operation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from typing import (
 
 ROOT = __name__.partition(".")[0]
 CONDUCTS = "analysis.commands.studies:conduct"
-"""Carries out every operation that is a study."""
+"""The function that carries out every operation that is a study."""
 Declared = TypeVar("Declared", bound="Operation")
 
 
@@ -29,11 +29,11 @@ class Request(NamedTuple):
     Parameters
     ----------
     name : str
-        Of its key; empty: that of the field.
+        Key in the body; empty: the name of the field.
     above, least, most : float, optional
-        Limits of a number: below all allowed ones, the first and the last allowed.
+        Limits of a number: it is above `above`, and from `least` to `most`.
     choices : tuple of str
-        Texts that are allowed; empty: any of 1 to 200 letters.
+        Allowed texts; empty: any text of 1 to 200 characters.
     """
 
     name: str = ""
@@ -44,22 +44,22 @@ class Request(NamedTuple):
 
 
 class Argument:
-    """Words and limits of an argument.
+    """Help text and limits of an argument.
 
     Parameters
     ----------
     *names : str
-        Its options on the command line; none: made from the name of the field.
+        Options on the command line; by default made from the name of the field.
     help : str
-        What it says, with its unit.
+        Help text, with the unit.
     metavar : str, optional
-        Stands for its value in the help.
+        Placeholder for the value in the help.
     min, max : float, optional
         Limits of a number, both allowed.
     python : str, optional
-        Its form in the Python door where that differs, as in a signature; empty: it is not there.
+        Form in the Python door where it differs, as in a signature; empty: the door does not have this argument.
     request : Request, optional
-        Its form in the body of a request; None: it is not there.
+        Form in the body of a request; None: the service does not take this argument.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Argument:
 
 
 class Option(Argument):
-    """An argument that has a name on the command line."""
+    """An argument that is named on the command line."""
 
 
 class Positional(Argument):
@@ -88,7 +88,7 @@ class Positional(Argument):
 
 
 class Field(NamedTuple):
-    """A declared argument: name, type, default (`MISSING`: required) and words."""
+    """A declared argument: name, type, default (`MISSING`: required), help text and limits."""
 
     name: str
     type: Any
@@ -97,16 +97,16 @@ class Field(NamedTuple):
 
 
 class Door(NamedTuple):
-    """The function of the Python door that does what an operation does.
+    """The function of the Python door for an operation.
 
     Parameters
     ----------
     name : str
-        In `vibroimpact`.
+        Name in `vibroimpact`.
     also : tuple of str
-        Parameters that only it has, as in its signature.
+        Parameters of the function that the operation lacks, as in its signature.
     without : tuple of str
-        Arguments that it does not have, beside those without a form in Python.
+        Arguments of the operation that the function lacks, besides those without a form in Python.
     """
 
     name: str
@@ -120,11 +120,11 @@ class Operation:
     Attributes
     ----------
     runs : str
-        `module:function` below the package: called with the operation, it carries it out.
+        `module:function` below the package that carries the operation out when called with it.
     door : Door or None
         The function in Python, whose signature a test compares with the arguments.
     study : str
-        `module:class` of the study that it is, below the package; empty: it is no study.
+        `module:class` of the operation's study, below the package; empty: the operation is no study.
     """
 
     runs: ClassVar[str]
@@ -132,7 +132,7 @@ class Operation:
     study: ClassVar[str] = ""
 
     def carry_out(self, **how: Any) -> None:
-        """Call the function that the operation names, with keywords of it that are no arguments of the operation."""
+        """Call the function that the operation names; pass keywords that are no arguments of the operation."""
         pkgutil.resolve_name(f"{ROOT}.{self.runs}")(self, **how)
 
     @classmethod
@@ -148,7 +148,7 @@ class Operation:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def operation(runs: str, door: Door | None = None) -> Callable[[type[Declared]], type[Declared]]:
-    """Return a decorator that declares an operation: see `Operation` for what it is given."""
+    """Return a decorator that declares an operation; `Operation` explains the parameters."""
 
     def declared(cls: type[Declared]) -> type[Declared]:
         cls.runs, cls.door = runs, door
@@ -159,7 +159,7 @@ def operation(runs: str, door: Door | None = None) -> Callable[[type[Declared]],
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def study(place: str, door: Door | None = None) -> Callable[[type[Declared]], type[Declared]]:
-    """Return a decorator that declares an operation that is a study: `module:class` of it, and its door."""
+    """Return a decorator that declares a study as an operation, from its `module:class` and its door."""
 
     def declared(cls: type[Declared]) -> type[Declared]:
         cls.study = place

@@ -1,4 +1,4 @@
-"""Operation `fmu build`: the components of the package, compiled for this machine."""
+"""Operation `fmu build`: compile the components of the package for this machine."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ class BuildFmus(Operation):
     Example: vibroimpact fmu build
     """
 
-    output: Annotated[Path | None, Option(help="Folder to fill; else that of the package.")] = None
+    output: Annotated[Path | None, Option(help="Folder to fill; default: the package's.")] = None

@@ -1,4 +1,4 @@
-"""Operation `fmu check`: what is wrong with FMUs."""
+"""Operation `fmu check`: find the faults of FMUs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from vibroimpact.fmus.operations import STRICT, Operation, Option, Positional, o
 class CheckFmus(Operation):
     """Check FMUs: description, binaries, functions, token. Runs their code.
 
-    What will not run is an error, what may run wrong and what is only odd are said.
+    Faults that keep an FMU from running are errors. Faults that may spoil a run, and mere oddities, are printed.
 
     Example: vibroimpact fmu check Oscillator.fmu
     """
 
-    files: Annotated[list[Path] | None, Positional(help="FMU files; all of the package if none.")] = None
+    files: Annotated[list[Path] | None, Positional(help="FMU files; default: all of the package.")] = None
     strict: Annotated[bool, Option("--strict", help=STRICT)] = False

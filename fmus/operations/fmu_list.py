@@ -7,7 +7,7 @@ from vibroimpact.fmus.operations import Operation, operation
 
 @operation("fmus.commands.fmu:print_components")
 class ListFmus(Operation):
-    """Show every component, its FMUs and what they run on.
+    """Show every component, its FMUs and their platforms.
 
     Example: vibroimpact fmu list
     """

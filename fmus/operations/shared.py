@@ -1,4 +1,4 @@
-"""Arguments that operations of several packages have, worded once."""
+"""Arguments that operations of several packages share."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Annotated
 
 from vibroimpact.fmus.operations.declaring import Option
 
-#: Help of the option of all commands that read FMUs of other tools.
-STRICT = "Refuse FMUs that may run wrong, instead of saying so."
+#: Help text of the option of all commands that read FMUs of other tools.
+STRICT = "Refuse FMUs that may run wrong, instead of warning."
 Force = Annotated[
     bool,
     Option(
         "--force",
-        help="Overwrite a file that holds something else; the same command may be repeated without.",
+        help="Overwrite a file with other contents; repeating the same command needs no --force.",
         python="",
     ),
 ]

@@ -1,1 +1,1 @@
-"""FMUs as files: described, compiled, zipped, checked and exported; foreign ones unpacked and looked at first."""
+"""FMUs as files: described, compiled, zipped, checked and exported; foreign ones are inspected and unpacked."""

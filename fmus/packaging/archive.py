@@ -1,7 +1,7 @@
-"""Opens FMU files safely and unpacks each once per machine.
+"""Safe opening of FMU files; each is unpacked once per machine.
 
-An FMU is a zip with native code: whoever loads it trusts its code, but merely opening it must not write
-outside its folder, fill the disk, or expand entities. Everything here raises `ComponentFileError`.
+An FMU is a zip with native code. Loading it means to trust its code. But opening it must not write outside of its
+folder, fill the disk, or expand entities. Everything here raises `ComponentFileError`.
 """
 
 from __future__ import annotations
@@ -44,42 +44,42 @@ from vibroimpact.fmus.reader_process import Order, read_apart
 from vibroimpact.fmus.safe_xml import refuse_large, root_of
 from vibroimpact.fmus.shipped import is_shipped
 
-#: Most bytes of a model identifier: with an ending it is the name of a file.
+#: Longest model identifier, bytes: with an extension it is a file name.
 LONGEST_IDENTIFIER = 240
-#: Age, s, after which a half unpacked folder that no process has locked is swept: its process was killed.
+#: Age, s, above which a partly unpacked folder is removed if no process has locked it: its process was killed.
 ABANDONED_AFTER = 600.0
 INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
-#: The XML files that tools parse; all must be free of entities.
+#: XML files that tools parse; all must be free of entities.
 PARSED_XML = (
     "modelDescription.xml",
     "sources/buildDescription.xml",
     "terminalsAndIcons/terminalsAndIcons.xml",
 )
 BLOCK = 1 << 20
-#: Libraries of another name that a message lists.
+#: Number of misnamed libraries that a message lists.
 MOST_LIBRARIES = 3
-#: Limits of reading the XML of an FMU: processor time, s, with its size over a rate, bytes/s; memory, bytes. Plain
-#: descriptions are read at 2e6 bytes/s, and take 25 bytes for each of their own.
+#: Limits for reading the XML of an FMU: processor time, s, plus its size over a rate, bytes/s; memory, bytes. Plain
+#: descriptions are read at 2e6 bytes/s, and take 25 bytes of memory for each of their own.
 XML_SECONDS, XML_RATE, XML_MEMORY = 10.0, 5e5, 2 << 30
 _READER = "vibroimpact.fmus.packaging.description_check:read"
 
 
 @dataclass(frozen=True, slots=True)
 class UnpackedFmu:
-    """An FMU that was checked and lies unpacked in the cache.
+    """An FMU that was checked, and its unpacked copy in the cache.
 
     Attributes
     ----------
     source : Path
         The FMU file.
-    folder : Path
+    Its unpacked contents; all processes of the machine share the folder, and none may write to it.
         Its unpacked contents; shared by all processes of the machine, never to be written to.
     sha256 : str
         Hash of the FMU file.
-    fmi_version, token : str
+    Version `2.0` or `3.0`; instantiationToken of FMI 3.0, or guid of FMI 2.0.
         `2.0` or `3.0`; FMI 3.0 instantiationToken or FMI 2.0 guid.
     identifiers : tuple of str
-        Model identifiers, one for each interface it has, co-simulation first.
+        Model identifiers, one for each interface, co-simulation first.
     """
 
     source: Path
@@ -91,7 +91,7 @@ class UnpackedFmu:
 
     @property
     def resources(self) -> Path:
-        """Folder of the FMU's resources; need not exist."""
+        """Folder of the FMU's resources; it may be absent."""
         return self.folder / "resources"
 
 
@@ -102,17 +102,17 @@ def content_hash(path: Path) -> str:
 
 
 def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
-    """Check an FMU and unpack it, unless this machine has unpacked the same contents before.
+    """Check an FMU and unpack it, unless this machine has already unpacked the same contents.
 
-    What lies there is compared with the archive byte by byte, once in a process and again where a file changed
-    since: what is loaded is what `sha256` names. Safe with any number of processes at once: each unpacks into a
-    folder of its own, and the first to rename it into place wins. While this process lives no other one sweeps it.
+    An existing copy is compared with the archive byte by byte, once in a process, and again if a file changed since. So
+    the loaded files are those that `sha256` names. Any number of processes may call at once: each unpacks into its own
+    folder, and the first to rename it into place wins. Other processes do not remove the copy while this one lives.
 
     Raises
     ------
     ComponentFileError
-        It is missing, no zip, unsafe, of more than `limit` bytes when unpacked, or its description is too large or not
-        one of FMI 2.0 or 3.0.
+        The file is missing, no zip, unsafe, or of more than `limit` bytes when unpacked. The description is too large,
+        or not one of FMI 2.0 or 3.0.
     """
     path = Path(path)
     with opened(path) as file, zip_in(path, file) as archive:
@@ -128,7 +128,7 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
 
 
 def _refuse_large_xml(path: Path, members: list[zipfile.ZipInfo]) -> None:
-    """Raise ComponentFileError where a file that tools parse is too large to be given to a parser."""
+    """Raise ComponentFileError if a file that tools parse is too large for a parser."""
     for member in members:
         name = "/".join(place_of(member))
         if name in PARSED_XML:
@@ -141,9 +141,9 @@ def binary_path(fmu: UnpackedFmu) -> Path:
     Raises
     ------
     ComponentFileError
-        It has none; the message names the platforms it does have.
+        The FMU has none; the message names its platforms.
     """
-    # FMI 2.0.4 allows FMI 3.0's names of platforms too; in an FMU for several, linux64 is not that of ARM
+    # FMI 2.0.4 also allows FMI 3.0's names of platforms; in an FMU for several, linux64 is not that of ARM
     own, exact = binary_folder(fmu.fmi_version), binary_folder("3.0")
     folders = dict.fromkeys((exact, own) if architecture() == "aarch64" else (own, exact))
     names = [f"{folder}/{fmu.identifiers[0]}{library_suffix()}" for folder in folders]
@@ -161,13 +161,13 @@ def binary_path(fmu: UnpackedFmu) -> Path:
 
 
 def _libraries(fmu: UnpackedFmu, folder: str) -> list[str]:
-    """Return the libraries that lie in a folder of the binaries, whatever they are called."""
+    """Return the libraries in a folder of binaries, by any name."""
     files = sorted((fmu.folder / "binaries" / folder).glob(f"*{library_suffix()}"))
     return [cut(file.relative_to(fmu.folder).as_posix()) for file in files[:MOST_LIBRARIES]]
 
 
 def platforms(fmu: UnpackedFmu) -> tuple[str, ...]:
-    """Return the names of the platforms that an FMU has files for."""
+    """Return the names of the platforms for which an FMU has files."""
     return tuple(sorted(p.name for p in fmu.folder.glob("binaries/*") if p.is_dir()))
 
 
@@ -183,12 +183,12 @@ def _cache(path: Path) -> Path:
         ) from error
 
 
-#: Of the folders that this process has compared with their archives: what each file looked like then.
+#: Folders that this process has compared with their archives, with the state of each file at that time.
 _compared: dict[Path, list[FileState]] = {}
 
 
 def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> bool:
-    """Return whether a folder holds what its archive does; files that an FMU made beside them do not count."""
+    """Return whether a folder holds the contents of its archive; further files that an FMU made do not count."""
     try:
         refuse_links(folder)
         refuse_unsafe(folder)
@@ -201,7 +201,7 @@ def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.Zip
     except UnsafeFolderError as error:
         raise ComponentFileError(f"{archive.filename}: was not unpacked: {error}") from error
     except (OSError, *DAMAGE):
-        # caches get cleaned by the system, sometimes file by file; a damaged archive shows when it is unpacked
+        # systems clean caches, sometimes file by file; unpacking will report a damaged archive
         return False
     return True
 
@@ -257,11 +257,11 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
                 target.mkdir(parents=True, exist_ok=True)
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)
-            # reading ends at the size in the directory, whatever the data would expand to
+            # reading ends at the size in the directory, however far the data would expand
             with archive.open(member) as source, target.open("wb") as file:
                 shutil.copyfileobj(source, file, BLOCK)
     except OSError as error:
-        if error.errno is None:  # bz2 says so that its data are damaged
+        if error.errno is None:  # bz2 reports damaged data by an error without number
             raise damaged(path, error) from error
         raise ComponentFileError(
             f"{path}: could not be unpacked into {folder.parent}: {error.strerror}."
@@ -278,18 +278,18 @@ def _check_xml(path: Path, digest: str, folder: Path) -> None:
 
 
 def refuse_broken_description(fmu: UnpackedFmu, seconds: float) -> None:
-    """Let a process of its own read the description of an FMU, for who shall not read it himself.
+    """Read the description of an FMU in a separate process, for callers that must not parse it themselves.
 
     Parameters
     ----------
     fmu : UnpackedFmu
     seconds : float
-        Processor time that its XML may take, s.
+        Limit of the processor time for its XML, s.
 
     Raises
     ------
     ComponentFileError
-        It takes longer, or breaks FMI's rules where there is no way round.
+        The XML takes longer, or breaks FMI's rules beyond repair.
     """
     refusal = _read_apart(fmu.source, fmu.folder, seconds)
     if refusal:
@@ -297,9 +297,9 @@ def refuse_broken_description(fmu: UnpackedFmu, seconds: float) -> None:
 
 
 def _read_apart(path: Path, folder: Path, seconds: float) -> str:
-    """Let a process of its own read the XML of an FMU; return which of FMI's rules it breaks.
+    """Read the XML of an FMU in a separate process; return the broken rules of FMI.
 
-    XML that cannot be read within the limits raises ComponentFileError.
+    Raise ComponentFileError if the XML cannot be read within the limits.
     """
     answer = read_apart(Order(_READER, os.path.abspath(folder), {"where": str(path)}, seconds, XML_MEMORY))
     if answer.error == ComponentFileError.__name__:
@@ -317,7 +317,7 @@ def _rename(temporary: Path, folder: Path, archive: zipfile.ZipFile, members: li
     except OSError as error:
         if _is_intact(folder, archive, members):
             return  # another process was first
-        # a copy that is not the archive's: out of the way, then ours in its place
+        # the copy differs from the archive: remove it, then put ours in its place
         shutil.rmtree(folder, ignore_errors=True)
         try:
             temporary.rename(folder)
@@ -343,7 +343,7 @@ def value_references(fmu: UnpackedFmu) -> dict[str, int]:
 
 @lru_cache(maxsize=64)
 def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
-    """Return what the description of an FMU says of it; the digest stands for its contents, which are read once."""
+    """Return the facts in an FMU's description; the digest is part of the cache key, so that contents are read once."""
     root = _description(path, folder)
     version = root.get("fmiVersion", "")
     token = root.get("guid") if version == "2.0" else root.get("instantiationToken")

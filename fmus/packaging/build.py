@@ -1,7 +1,7 @@
-"""Builds every component into FMUs for this machine: `python -m vibroimpact.fmus.packaging.build`.
+"""Build every component into FMUs for this machine: `python -m vibroimpact.fmus.packaging.build`.
 
 Each folder of `native/` with a `variables.toml` is a component. Its library holds the shared core, both FMI
-adapters and its own C files; FMI's headers come from the FMPy package. Imports the standard library only
+adapters and its own C files; FMI's headers come from the FMPy package. This module imports the standard library only
 (FMPy is located, not imported), since it also runs while the package itself is being built.
 """
 
@@ -38,16 +38,16 @@ PACKAGE = HERE.parent
 NATIVE = PACKAGE / "native"
 BUILT = PACKAGE / "built"
 CORE_LIBRARY = "libvibroimpact_core"
-#: Where a release has the libraries of all platforms, each in a folder of its platform's name.
+#: Folder of a release with the libraries of all platforms, each in a folder named by its platform.
 PLATFORMS_FOLDER = "platforms"
-#: Length of an array below which gcc warns of loops over its further elements, though they never run.
+#: Smallest length of an array in the sizes: gcc warns of loops over further elements of a shorter one.
 SMALLEST_ARRAY = 2
-#: Name of the file that says from which sources the folder was built.
+#: Name of the file with the hash of the sources that the folder was built from.
 FINGERPRINT = "sources.sha256"
 
 
 def read_components(native: Path = NATIVE) -> tuple[ComponentDescription, ...]:
-    """Read every component of a folder of C sources, in the order of their folders' names."""
+    """Return every component of a folder of C sources, in the order of the folders' names."""
     return tuple(read_component(path) for path in sorted(native.glob("*/variables.toml")))
 
 
@@ -59,14 +59,14 @@ def build(output: Path = BUILT, *, native: Path = NATIVE, strict: bool = True) -
     output : Path
         Folder to fill: `fmi3/*.fmu`, `fmi2/*.fmu`, the core library, the fingerprint of the sources.
     native : Path
-        The C sources.
+        Folder of the C sources.
     strict : bool
-        Compiler warnings are errors.
+        Whether compiler warnings are errors.
 
     Returns
     -------
     tuple of Path
-        The files written.
+        The written files.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def build(output: Path = BUILT, *, native: Path = NATIVE, strict: bool = True) -
 def build_platforms(output: Path, *, native: Path = NATIVE) -> tuple[Path, ...]:
     """Compile the libraries of all components for every platform, into `PLATFORMS_FOLDER`; takes minutes.
 
-    Without the ziglang package, or where it finds an error, ComponentError is raised.
+    Raise ComponentError without the ziglang package, or if it finds an error.
     """
 
     def compiled(pair: tuple[ComponentDescription, Platform]) -> Path:
@@ -106,7 +106,7 @@ def build_platforms(output: Path, *, native: Path = NATIVE) -> tuple[Path, ...]:
 
 
 def is_current(output: Path = BUILT, *, native: Path = NATIVE) -> bool:
-    """Return whether a folder holds what `build` would make of the sources as they are now."""
+    """Return whether a folder holds the results of `build` for the present sources."""
     stamp = output / FINGERPRINT
     return stamp.is_file() and stamp.read_text(encoding="ascii").strip() == fingerprint(native)
 
@@ -116,7 +116,7 @@ def fingerprint(native: Path = NATIVE) -> str:
     digest = hashlib.sha256(repr((LANGUAGE, WARNINGS, ACROSS_FILES, sys.platform)).encode())
     sources = [p for p in native.rglob("*") if p.suffix in {".c", ".h", ".toml", ".md"}]
     builders = [*(HERE / "description").glob("*.py"), HERE / "build.py"]
-    # by places inside the folders: where these lie does not matter, where a file lies in them does
+    # by places inside the folders: the fingerprint depends on these, not on the place of the folders
     for folder, paths in ((native, sources), (HERE, builders)):
         for place, path in sorted((path.relative_to(folder).as_posix(), path) for path in paths):
             digest.update(place.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
@@ -124,7 +124,7 @@ def fingerprint(native: Path = NATIVE) -> str:
 
 
 def update_readmes(native: Path = NATIVE, *, write: bool = True) -> tuple[Path, ...]:
-    """Renew the table of variables in each component's README; return the READMEs that were out of date."""
+    """Update the table of variables in each component's README; return the READMEs that were out of date."""
     stale = []
     for component in read_components(native):
         path = _readme(component)
@@ -167,7 +167,7 @@ def compile_component(
 ) -> bytes:
     """Return a component's shared library, for this machine or another platform.
 
-    ComponentError: no compiler works, or one found an error.
+    Raise ComponentError if no compiler works, or it finds an error.
     """
     core, folders = native / "core", beside_core(component, native)
     sources = [path for path in _c_files(core) if is_part(component, path.relative_to(core))]
@@ -182,7 +182,7 @@ def compile_component(
             sources,
             include,
             definitions=defined,
-            # of one mode, most of what an impact costs are calls
+            # with one mode, calls are most of the cost of an impact
             across_files=defined["VI_ONLY_MODES"] == 1,
             strict=strict,
             platform=platform,
@@ -191,13 +191,13 @@ def compile_component(
 
 
 def beside_core(component: ComponentDescription, native: Path = NATIVE) -> tuple[Path, ...]:
-    """Return the folders of C sources that a component has beside the core: those that are shared, then its own."""
+    """Return the folders of a component's C sources outside of the core: the shared folders, then its own."""
     is_body = component.repeats.get("contact", 0) > 0
     return (native / "adapters", *([native / "bodies"] if is_body else ()), native / component.folder)
 
 
 def is_part(component: ComponentDescription, file: Path) -> bool:
-    """Return whether a component has a file of the core; what is called by ctypes is in the core library alone."""
+    """Return whether a component includes a file of the core; functions for ctypes are in the core library alone."""
     return file.parts[0] not in {"door", "lanes"} and component.uses(file.as_posix())
 
 
@@ -210,13 +210,13 @@ def _write_versions(component: ComponentDescription, binary: bytes, output: Path
 def sizes(component: ComponentDescription) -> dict[str, int]:
     """Return the sizes that a component is compiled for, as sizes.h names them.
 
-    What a component has no use for is no part of its saved states.
+    Saved states do not contain parts that the component has no use for.
     """
     blocks = component.repeats
     modes = blocks.get("mode", blocks.get("mass"))
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
-    # loops over the modes of a body that has no more than one cost nothing
+    # the constant removes loops over modes from a body with only one
     return {**arrays, "VI_ONLY_MODES": 0 if modes is not None else 1}
 
 
@@ -232,7 +232,7 @@ def _write_component(component: ComponentDescription, binary: bytes, folder: Pat
 
 
 def documentation(component: ComponentDescription) -> dict[str, bytes]:
-    """Return the members of an FMU that a person reads: what the component is, with its table of variables."""
+    """Return the members of an FMU that a person reads: the component's description with its table of variables."""
     path = _readme(component)
     has_readme = path.is_file()
     text = with_table(path.read_text(encoding="utf-8"), component) if has_readme else component.description
@@ -250,7 +250,7 @@ def _readme(component: ComponentDescription) -> Path:
 
 
 def _licence() -> bytes:
-    # beside the sources in a checkout, inside the package when installed
+    # next to the sources in a checkout, inside the package when installed
     places = (PACKAGE.parent / "LICENSE", PACKAGE / "LICENSE")
     return next(path for path in places if path.is_file()).read_bytes()
 
@@ -260,10 +260,10 @@ def _c_files(folder: Path) -> list[Path]:
 
 
 def _replace(source: Path, target: Path) -> None:
-    # a running process may have the old library loaded: give the new one a new file, never overwrite
-    beside = target.with_name(f".{target.name}.new")
-    shutil.copyfile(source, beside)
-    beside.replace(target)
+    # a running process may have loaded the old library: write a new file, never overwrite
+    temporary = target.with_name(f".{target.name}.new")
+    shutil.copyfile(source, temporary)
+    temporary.replace(target)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""Checks an FMU: its description as every reader here grades it, and its binaries, which are loaded.
+"""Check of an FMU: its description, graded as by every reader here, and its binaries, which are loaded.
 
 Every declared binary must exist, and the one for this machine is loaded: all functions resolve, and only the
 described token opens it.
@@ -19,9 +19,9 @@ from vibroimpact.fmus.packaging.platform_names import FMI2_SYSTEMS, SUFFIXES
 from vibroimpact.fmus.processes.call import call
 from vibroimpact.fmus.safe_xml import root_of
 
-#: Longest time that loading and instantiating an FMU may take, s.
+#: Longest time for loading and instantiating an FMU, s.
 LOADING_LIMIT = 60.0
-#: What the interfaces are called.
+#: Names of the interfaces, for people.
 KINDS = {
     "CoSimulation": "co-simulation",
     "ModelExchange": "model exchange",
@@ -32,15 +32,15 @@ SYSTEM_OF_PREFIX = {prefix: system for system, prefix in FMI2_SYSTEMS.items()}
 
 
 def check_fmu(path: Path) -> tuple[Finding, ...]:
-    """Return everything that is wrong with an FMU, graded, one line each; empty if nothing is.
+    """Return everything that is wrong with an FMU, graded, one line each; empty if nothing is wrong.
 
-    Its code is run, in a process of its own: a crash there is one more problem here.
+    The FMU's code runs in a separate process: a crash there is one more problem here.
     """
     try:
         fmu = unpack(path)
     except ComponentFileError as error:
         return (Finding(Grade.refused, str(error).removeprefix(f"{path}: ")),)
-    # what two interfaces have in common is wrong with each of them
+    # a fault that two interfaces share is reported once
     return tuple(
         dict.fromkeys(
             (
@@ -54,7 +54,7 @@ def check_fmu(path: Path) -> tuple[Finding, ...]:
 
 
 def kinds_of(path: Path) -> str:
-    """Return in words what an FMU is for: `FMI 3.0: co-simulation, model exchange`."""
+    """Return the uses of an FMU in words: `FMI 3.0: co-simulation, model exchange`."""
     fmu = unpack(path)
     root = _description(fmu)
     found = [KINDS[tag] for tag in INTERFACES if root.find(tag) is not None]
@@ -70,7 +70,7 @@ def _description_findings(path: Path) -> tuple[Finding, ...]:
 
 
 def _archive_remarks(path: Path, fmu: UnpackedFmu) -> Iterator[Finding]:
-    """Yield what is wrong with members that no run looks at."""
+    """Yield the faults of members that no run uses."""
     with zipfile.ZipFile(path) as archive:
         members = [member.orig_filename for member in archive.filelist]
     for name in members:
@@ -88,7 +88,7 @@ def _description(fmu: UnpackedFmu) -> ElementTree.Element:
 
 
 def _missing_binaries(fmu: UnpackedFmu) -> Iterator[Finding]:
-    """Yield the libraries that other machines do not find; the one of this machine is loaded."""
+    """Yield the libraries that other machines would miss; this machine's library is loaded instead."""
     for platform in platforms(fmu):
         for identifier in dict.fromkeys(fmu.identifiers):
             binary = fmu.folder / "binaries" / platform / f"{identifier}{_suffix(platform)}"
@@ -99,7 +99,7 @@ def _missing_binaries(fmu: UnpackedFmu) -> Iterator[Finding]:
 
 
 def _suffix(platform: str) -> str:
-    # FMI 3.0 ends with the system (x86_64-linux), FMI 2.0 begins with it (linux64)
+    # FMI 3.0 names end with the system (x86_64-linux), FMI 2.0 names begin with it (linux64)
     system = platform.rpartition("-")[2].rstrip("0123456789")
     return SUFFIXES.get(SYSTEM_OF_PREFIX.get(system, system), "")
 
@@ -117,12 +117,12 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
         "interfaces": [
             tag
             for tag in INTERFACES
-            # those of another library than the one that is loaded are not looked into
+            # interfaces of other libraries than the loaded one are not checked
             for interface in root.findall(tag)
             if interface.get("modelIdentifier") == fmu.identifiers[0]
         ],
         "resources": str(fmu.resources),
-        # PythonFMU's binary is the same for all its FMUs, and looks at no token
+        # PythonFMU's binary is the same for all its FMUs, and ignores the token
         "any_token": root.get("generationTool", "").startswith("PythonFMU"),
     }
     done = call("vibroimpact.fmus.packaging.load_check:problems_of", facts, seconds=LOADING_LIMIT)

@@ -1,4 +1,4 @@
-"""Finds a C compiler and makes shared libraries with it."""
+"""Search for a C compiler, and compilation of shared libraries with it."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging.platform_names import Platform, library_suffix, system
 from vibroimpact.fmus.processes.python_child import python_command
 
-#: Chosen by the user; if it does not work that is an error, not a reason to take another.
+#: Compiler that the user chose; if it does not work, that is an error, and no other compiler is tried.
 CHOICE = "VIBROIMPACT_CC"
 ON_PATH = ("cc", "gcc", "clang")
 
-# contraction off: a * b + c is rounded twice everywhere, so all machines give the same bits
+# no contraction: a * b + c is rounded twice everywhere, so that all machines give the same bits
 LANGUAGE = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion")
-#: Optimization across files, which not every linker knows, and the level at which it gains most.
+#: Optimization across files, unknown to some linkers, and the level at which it gains most.
 ACROSS_FILES = ("-O3", "-flto=auto")
 
 
 def find_compiler() -> tuple[str, ...]:
     """Return the command of the first C compiler that works.
 
-    Tried in order: `$VIBROIMPACT_CC`, `$CC`, cc, gcc, clang, and the ziglang package. ComponentError: none works, or
-    the one that `$VIBROIMPACT_CC` names does not.
+    The candidates are, in order, `$VIBROIMPACT_CC`, `$CC`, cc, gcc, clang and the ziglang package. Raise
+    ComponentError if none works, or if the compiler of `$VIBROIMPACT_CC` does not.
     """
     for command in _candidates():
         if _works(command):
@@ -47,7 +47,7 @@ def find_compiler() -> tuple[str, ...]:
 
 
 def has_compiler() -> bool:
-    """Return whether a compiler is there without the ziglang package."""
+    """Return whether there is a compiler besides the ziglang package."""
     return any(_works(command) for command in _candidates() if "ziglang" not in command)
 
 
@@ -64,10 +64,10 @@ def compile_library(
 ) -> None:
     """Compile C files, with the folders of their headers, into one shared library, the target.
 
-    Definitions are macros and their values. `export_all` exports every function, not only those marked for it.
-    `across_files` optimizes across files where compiler and linker can; it takes half as long again. Strictly, warnings
-    are errors; not so where users build, since a newer compiler may know new warnings. The ziglang package compiles for
-    another platform. ComponentError has the compiler's own words.
+    Definitions are macros and their values. `export_all` exports every function, not only the marked ones.
+    `across_files` optimizes across files where compiler and linker can; it takes half as long again. `strict` turns
+    warnings into errors; it is off where users build, since a newer compiler may know new warnings. The ziglang package
+    compiles for another platform. Raise ComponentError with the compiler's own words.
     """
     compiler = find_compiler() if platform is None else zig_compiler()
     options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler, platform)]
@@ -87,7 +87,7 @@ def compile_library(
 
 
 def zig_compiler() -> tuple[str, ...]:
-    """Return the command of the compiler for other machines; ComponentError if the package ziglang is not installed."""
+    """Return the command of the compiler for other machines; raise ComponentError without the package ziglang."""
     if not importlib.util.find_spec("ziglang"):
         raise ComponentError(
             "compiler: expected the package ziglang to compile for another machine, got none. "
@@ -100,10 +100,10 @@ def _platform_options(compiler: Sequence[str], platform: Platform | None = None)
     windows = (system() if platform is None else platform.system) == "windows"
     options = ["-shared"] if windows else ["-shared", "-fPIC"]
     if "ziglang" in compiler:
-        # by default zig compiles for the very processor at hand; a wheel must run on every one
+        # by default zig compiles for the processor at hand; a wheel must run on every processor
         options += ["-mcpu=baseline", "-fno-sanitize=undefined"]
     if platform is not None:
-        # symbols for a debugger are three quarters of a library, and name the folder it was compiled in
+        # symbols for a debugger are three quarters of a library, and name the folder of its compilation
         options += ["-target", platform.target, "-s"]
     return options
 
@@ -121,7 +121,7 @@ def _candidates() -> Iterator[tuple[str, ...]]:
 
 @cache
 def _works(command: tuple[str, ...]) -> bool:
-    # a compiler without the C library's headers, or the stub of a system without one, is none
+    # a compiler without the C library's headers, or the stub of a system without one, does not count
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "probe.c")
         source.write_text("#include <math.h>\ndouble probe(double x) { return sin(x); }\n")

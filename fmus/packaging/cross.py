@@ -1,4 +1,4 @@
-"""Libraries of the components for other machines than this one: shipped with a release, kept, or compiled by zig."""
+"""Libraries of the components for other machines: shipped with a release, kept in a cache, or compiled by zig."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ Note = Callable[[str], None]
 
 
 def chosen_platforms(names: str) -> tuple[Platform, ...]:
-    """Return the platforms that `all`, or names with commas between them, stand for.
+    """Return the platforms named by `all`, or by names with commas between them.
 
-    A name that FMI has not, or for which nothing can be made, raises UsageError.
+    Raise UsageError for a name that is unknown to FMI, or that nothing can be compiled for.
     """
-    wanted = list(TARGETS) if names.strip() == "all" else [name.strip() for name in names.split(",")]
-    unknown = [name for name in wanted if name not in TARGETS]
+    chosen = list(TARGETS) if names.strip() == "all" else [name.strip() for name in names.split(",")]
+    unknown = [name for name in chosen if name not in TARGETS]
     if unknown:
         raise UsageError(f"platform: expected all, or some of {', '.join(TARGETS)}, got {unknown[0]!r}.")
-    return tuple(Platform(name) for name in dict.fromkeys(wanted))
+    return tuple(Platform(name) for name in dict.fromkeys(chosen))
 
 
 def library_for(component: ComponentDescription, platform: Platform, note: Note = lambda _: None) -> bytes:
-    """Return a component's library for a platform; the component is as it is compiled in, not one of an export.
+    """Return a component's library for a platform; the component must be as compiled, not as edited for an export.
 
-    `note` is told what is compiled, which takes from seconds to, the first time for Windows, minutes. What is not there
-    and cannot be compiled raises ComponentError.
+    `note` gets a line about each compilation. It takes seconds, for Windows minutes the first time. Raise
+    ComponentError for a library that is absent and cannot be compiled.
     """
     name = f"{component.name}{platform.suffix}"
     shipped = SHIPPED / platform.name / name
@@ -46,9 +46,9 @@ def library_for(component: ComponentDescription, platform: Platform, note: Note 
     zig_compiler()
     note(f"{platform.name}: compiling {component.name}")
     library = compile_component(component, strict=False, platform=platform)
-    beside = kept.with_name(f".{name}.new")
-    beside.write_bytes(library)
-    beside.replace(kept)
+    temporary = kept.with_name(f".{name}.new")
+    temporary.write_bytes(library)
+    temporary.replace(kept)
     return library
 
 
@@ -57,7 +57,7 @@ def members_for(
 ) -> dict[str, bytes]:
     """Return the members of an FMU that hold its binaries, named by the model identifier.
 
-    FMI `2.0` has one folder for both processors of macOS: there the file holds both; `3.0` has two.
+    FMI `2.0` has one folder for both processors of macOS, whose file holds both libraries; FMI `3.0` has two folders.
     """
     members: dict[str, dict[Platform, bytes]] = {}
     for platform in platforms:
@@ -67,7 +67,7 @@ def members_for(
 
 
 def universal(libraries: Mapping[Platform, bytes]) -> bytes:
-    """Return one library for several processors of macOS, a Mach-O file of several; a single one as it is."""
+    """Return one library for several processors of macOS, as one Mach-O file; a single library as it is."""
     if len(libraries) == 1:
         return next(iter(libraries.values()))
     header, body = struct.pack(">II", 0xCAFEBABE, len(libraries)), bytearray(1 << _ALIGNMENT)
@@ -80,13 +80,13 @@ def universal(libraries: Mapping[Platform, bytes]) -> bytes:
     return bytes(body)
 
 
-#: Type and subtype of a processor in Mach-O, and the power of two that each part begins at a multiple of.
+#: Type and subtype of a processor in Mach-O.
 _MACH_PROCESSORS = {"x86_64": (0x01000007, 3), "aarch64": (0x0100000C, 0)}
 _ALIGNMENT = 14
 
 
 def _kept(platform: Platform) -> Path:
-    """Return the folder of what was compiled for a platform from these sources by this compiler."""
+    """Return the cache folder of libraries for a platform, by these sources and this compiler."""
     compiler = metadata.version("ziglang") if util.find_spec("ziglang") else "none"
     try:
         folder = private_folder("libraries") / f"{fingerprint()[:16]}-zig-{compiler}" / platform.name

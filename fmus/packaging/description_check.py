@@ -1,4 +1,4 @@
-"""Reads the descriptions of an FMU once by all parsers that meet them later: in the process that `archive` asks."""
+"""Reading of an FMU's descriptions by all parsers that meet them later, in the process that `archive` starts."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from vibroimpact.fmus.safe_xml import root_of
 def read(path: str, options: dict[str, Any]) -> tuple[str, tuple[()]]:
     """Parse the XML of an unpacked FMU; messages begin with the option `where`.
 
-    The text returned says which of FMI's rules the description breaks where there is no way round, and is told where
-    the description is used. XML that is not well-formed, or declares a document type or an entity, raises
-    ComponentFileError.
+    The returned text lists the rules of FMI that the description breaks beyond repair; the user of the description
+    reports it. Raise ComponentFileError for XML that is not well-formed, or that declares a document type or an entity.
     """
     for name in PARSED_XML:
         file = Path(path, name)

@@ -1,6 +1,6 @@
-"""The page of an FMU's documentation, `documentation/index.html`: one file, without scripts or anything from elsewhere.
+"""The page of an FMU's documentation, `documentation/index.html`: one file, without scripts or outside content.
 
-It is the component's README and equations, with the variables of this very FMU.
+The page holds the component's README and equations, with the variables of the FMU itself.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from html import escape
 from vibroimpact.fmus.packaging.description import ComponentDescription, Edition, Variable, literal
 
 MEMBER = "documentation/index.html"
-#: The heading of a README's table of variables, the last of its sections; this FMU's own stands here instead.
+#: Heading of the last section of a README, its table of variables; the FMU's own table replaces it.
 VARIABLES = "\n## Variables\n"
-#: Beginnings of what in a README is for who has the package's sources.
+#: Beginnings of README paragraphs for readers who have the package's sources.
 FOR_DEVELOPERS = ("Files:", "Test it alone", "Make one:")
 STYLE = """\
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
@@ -39,8 +39,7 @@ def page(
 ) -> str:
     """Return the text of the page of a component as it is described.
 
-    Equations are HTML and MathML. The icon, none where empty, and further files, with what they are, are named from the
-    page.
+    Equations are HTML and MathML. The page refers to the icon (empty: none), and to further files with their captions.
     """
     title = escape(component.name)
     picture = f'<img src="{escape(icon)}" alt="">' if icon else ""
@@ -59,8 +58,8 @@ def page(
 
 
 def _rendered(readme: str) -> str:
-    """Return a README as HTML, without what is only of use beside the sources."""
-    from markdown_it import MarkdownIt  # not there while the package is being built
+    """Return a README as HTML, without the parts that need the sources."""
+    from markdown_it import MarkdownIt  # absent while the package is being built
 
     text = readme.partition(VARIABLES)[0]
     paragraphs = re.split(r"\n\n+", text)
@@ -69,7 +68,7 @@ def _rendered(readme: str) -> str:
     tokens = markdown.parse("\n\n".join(p for p in kept if p))
     for token in tokens:
         if token.children:
-            # what links lead to is not in the FMU
+            # targets of links are not in the FMU
             token.children = [t for t in token.children if t.type not in {"link_open", "link_close", "image"}]
     html: str = markdown.renderer.render(tokens, markdown.options, {})
     return html

@@ -1,4 +1,4 @@
-"""How long a tool should run an exported body, and with which step, so that its motion is seen."""
+"""Default duration and step of a run of an exported body, chosen so that its motion is visible."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from vibroimpact.fmus.packaging.description import Experiment, Number
 
 PERIODS = 20
-"""Periods of the slowest motion that a default experiment shows."""
+"""Number of periods of the slowest motion in a default experiment."""
 
 STEPS_PER_PERIOD = 20
-"""Steps in a period of the fastest motion."""
+"""Number of steps in a period of the fastest motion."""
 
 MOST_STEPS = 10_000
-"""Steps in a default experiment: what is faster than they can show is computed all the same."""
+"""Largest number of steps in a default experiment; motion too fast for these steps is computed all the same."""
 
 SLOWEST, FASTEST = 1e-100, 1e100
-"""Angular frequencies beyond which a default experiment makes no sense, rad/s."""
+"""Range of angular frequencies for which a default experiment makes sense, rad/s."""
 
 Starts = Mapping[str, Number]
 
@@ -27,9 +27,9 @@ Starts = Mapping[str, Number]
 def default_experiment(component: str, starts: Starts, stop_time: float | None = None) -> Experiment:
     """Return the default experiment of a body, from all its start values by variable name.
 
-    It has `PERIODS` periods of its slowest natural frequency or of its forcing, whichever is slower, where no stop time
-    (s) is given. `STEPS_PER_PERIOD` steps are in each of the fastest, `MOST_STEPS` at most; both are rounded to two
-    digits. FMI's usual ten seconds stand where the numbers are too large or too small to have periods.
+    Without a stop time (s) it has `PERIODS` periods of the slowest natural frequency or of the forcing, whichever is
+    slower. It has `STEPS_PER_PERIOD` steps in the fastest period, and at most `MOST_STEPS` in total; both times are
+    rounded to two digits. Where the frequencies are too large or too small, FMI's usual ten seconds apply.
     """
     try:
         with np.errstate(all="ignore"):
@@ -67,7 +67,7 @@ def _chain(starts: Starts) -> list[float]:
     if not np.isfinite(scaled).all():
         return []
     squares = np.linalg.eigvalsh(scaled)
-    # what is left of a rigid motion is rounding
+    # squares below this are rounding errors of rigid motions
     return [math.sqrt(square) for square in squares if square > squares[-1] * 1e-12]
 
 

@@ -1,8 +1,8 @@
-"""Writes an FMU for another tool: a lean description, with start values of one's own; needs no compiler.
+"""Export of an FMU for another tool: a lean description with given start values, without a compiler.
 
-The binary is the one that was built: it knows its maxima, and reads from the FMU's resources how many its
-description has, and which start values. Contacts that no description mentions keep the law `none`. The value references
-of FMI 2.0 stay as they are; in FMI 3.0 they are places in the description, and a list in the resources says whose.
+The binary is the one that was built, with its maximum sizes. It reads the sizes of the description and the start values
+from the FMU's resources. Contacts outside of the description keep the law `none`. FMI 2.0 keeps the value references.
+In FMI 3.0 they are places in the description, and a list in the resources maps them back.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.members import Contents, component_of, edition_of, members_of
 from vibroimpact.fmus.shipped import component_name
 
-#: The member with the start values that are not the component's own, as resources.h describes it.
+#: Member with the start values that differ from the component's own; its format is in resources.h.
 STARTS_MEMBER = "resources/starts.txt"
-#: How many of a repeated block a lean description has where nobody says it.
+#: Default number of each repeated block in a lean description.
 LEAN_COUNTS = {"contact": 2, "sensor": 0}
 
-#: What start values begin with that set a body in motion.
+#: Prefix of start values that set a body in motion.
 SET_IN_MOTION = "forcing."
 
-#: The component that only a recording makes an FMU of.
+#: Component whose FMUs are made of recordings only.
 REPLAY = "Replay"
 
 Start = Number | str
@@ -71,49 +71,49 @@ def export_fmu(
     Parameters
     ----------
     name : str
-        The component.
+        Name of the component.
     output : path
         File to write.
     contacts, modes, masses, sensors : int, optional
-        How many its description has. `modes` of a Beam and `masses` of a Chain start with this number. Absent: as
-        many as `starts` speaks of, at least two contacts, no sensors, and as many modes or masses as the component
-        starts with; all that were compiled in for a `full` one.
+        Numbers in the description. `modes` of a Beam and `masses` of a Chain start with this number. The default is the
+        number that `starts` needs, with at least two contacts, no sensors, and the component's own number of modes or
+        masses. For a `full` description it is the number that was compiled in.
     fmi : str
         `3.0` or `2.0`.
     starts : mapping of str to number or str, optional
         Start values by variable name, SI: a number, a truth value, or the name of an enumeration's value; the others
-        are the component's own. Where none is of forcing or the state at the start, the body is displaced, to a side
-        where contacts leave room, so that a run shows motion.
+        are the component's own. If none of them sets the forcing or the initial state, the body starts displaced, so
+        that a run shows motion. The displacement is to a side where contacts leave room.
     full : bool
-        Describe all variables, as this package's own importer needs them.
+        Whether to describe all variables, as this package's own importer needs them.
     external : bool
-        Describe what a tool needs that answers contacts itself.
+        Whether to describe the variables for tools that answer contacts themselves.
     enumerations : bool
-        Describe enumerations as such, not as integers.
+        Whether to describe enumerations as such, not as integers.
     stop_time : float, optional
-        When a run ends where nobody says it, s; by default as suits the body's frequencies.
+        Default end of a run, s; without it, a time that suits the body's frequencies.
     platform : str, optional
-        `all`, or names with commas between them (`x86_64-windows,x86_64-linux`), for what machines it is; by default
-        this one and those whose libraries a release brings along.
+        Platforms of the FMU: `all`, or names with commas between them (`x86_64-windows,x86_64-linux`). The default is
+        this platform and those whose libraries a release contains.
     units : mapping of str to UnitDefinition, optional
-        Units, by variable name, of variables that have none of their own: those of a Gain.
+        Units, by variable name, for variables without a unit of their own: those of a Gain.
     note : callable
-        Told what is compiled for another machine, and what the library warns of.
+        Function that gets a line about each compilation for another machine, and each warning of the library.
 
     Returns
     -------
     Path
-        The file.
+        The written file.
 
     Raises
     ------
     ComponentFileError
-        There is no such component or it was not built.
+        The component is unknown, or it was not built.
     ComponentError
-        There is no library for a platform, and nothing to compile it with.
+        A platform has no library, and no compiler was found to build it.
     UsageError
-        More of them than were compiled in, a component that has none, a start value of no such variable, out of its
-        range or refused by the library, or a file that cannot be written.
+        A number is larger than compiled in, or the component has no such block. A start value has no variable, is out
+        of its range, or is refused by the library. The file cannot be written.
     """
     target = Path(output)
     full_name = component_name(name)
@@ -123,8 +123,8 @@ def export_fmu(
             "`vibroimpact fmu replay recording.nc -o replay.fmu`."
         )
     original = component_of(full_name)
-    asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
-    counts = {block: count for block, count in asked.items() if count is not None}
+    requested = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
+    counts = {block: count for block, count in requested.items() if count is not None}
     _check_counts(original, counts)
 
     def members_with(given: Mapping[str, Start]) -> dict[str, bytes]:
@@ -156,7 +156,7 @@ def export_fmu(
 def _first_taken(
     choices: Sequence[Mapping[str, Start]], members_with: Callable[[Mapping[str, Start]], dict[str, bytes]]
 ) -> dict[str, bytes]:
-    """Return the members with the first start values that the library takes, or the error of the last ones."""
+    """Return the members with the first start values that the library accepts, or raise the error of the last ones."""
     *first, last = choices
     for choice in first:
         with suppress(UsageError):
@@ -165,7 +165,7 @@ def _first_taken(
 
 
 def _displacements(component: ComponentDescription, starts: Mapping[str, Start]) -> list[dict[str, Start]]:
-    """Return start values that displace a body to either side; none where something else moves it."""
+    """Return start values that displace a body to either side; empty if a given start value moves the body."""
     if any(name.startswith(SET_IN_MOTION) or "_start" in name for name in starts):
         return []
     displaced: dict[str, Start] = dict(component.start_of_export)
@@ -179,7 +179,7 @@ def _numbers(component: ComponentDescription) -> dict[str, Number]:
 
 
 def _lean_counts(component: ComponentDescription, starts: Mapping[str, Number]) -> dict[str, int]:
-    """Return how many of each block a lean description has: no fewer than the start values speak of."""
+    """Return the number of each block in a lean description, large enough for all start values."""
     counts = dict.fromkeys(component.repeats, 0) | {
         block: min(count, component.repeats[block])
         for block, count in LEAN_COUNTS.items()
@@ -228,7 +228,7 @@ def _no_such_start(component: ComponentDescription, name: str) -> str:
 
 
 def _as_number(component: ComponentDescription, variable: Variable, value: Start) -> Number | None:
-    """Return a start value as its variable's type has it; None where it is none, or out of range."""
+    """Return a start value in the type of its variable; None if it has another type or is out of range."""
     number: Number | None
     names = {
         item.name: item.value
@@ -268,7 +268,7 @@ def _expected(component: ComponentDescription, variable: Variable) -> str:
 
 
 def _refuse_starts_beyond(component: ComponentDescription, starts: Mapping[str, Number]) -> None:
-    """Refuse start values of what the description leaves out, or beyond what it has."""
+    """Raise UsageError for start values of variables that the description leaves out, or beyond its sizes."""
     most = {v.name: math.inf if v.maximum is None else v.maximum for v in component.variables}
     more = "Ask for more of them, for external ports, or for the full description."
     for name, start in starts.items():
@@ -300,7 +300,7 @@ def _check_counts(component: ComponentDescription, counts: Mapping[str, int]) ->
                 f"{known}, got {count}. Leave the option out."
             )
             continue
-        # the variable that counts the blocks has the least number as its minimum
+        # the minimum of the variable that counts the blocks is their least number
         least = max((int(v.minimum or 0) for v in component.variables if v.counts == block), default=0)
         most = component.repeats[block]
         if not isinstance(count, int) or not least <= count <= most:

@@ -1,7 +1,7 @@
-"""The one door to FMPy: descriptions read and validated by the reference implementation of FMI in Python.
+"""The only use of FMPy: descriptions are read and validated by the reference implementation of FMI in Python.
 
-No other module imports fmpy; the drivers of FMUs call their functions directly. What integrates an FMU for model
-exchange, which this package does not, is FMPy's too.
+No other module imports fmpy; the drivers of FMUs call their functions directly. FMPy also integrates FMUs for model
+exchange, which this package does not.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vibroimpact.fmus.packaging.model_description import Finding, amended
 
 @contextmanager
 def _libraries_of_this_process() -> Iterator[None]:
-    """Let FMPy find the C library in this process: on Linux it would start `ldconfig`, in every worker again."""
+    """Make FMPy find the C library in this process; on Linux it would start `ldconfig`, again in every worker."""
     find_library = ctypes.util.find_library
     if sys.platform == "linux":
         # `CDLL(None)` has the symbols of the process
@@ -67,9 +67,9 @@ class Reading:
     Attributes
     ----------
     description : ModelDescription
-        What FMPy makes of it.
+        The description in FMPy's form.
     findings : tuple of Finding
-        What is wrong with it all the same: remarks, and doubts.
+        Faults that did not prevent the reading: remarks and doubts.
     """
 
     description: ModelDescription
@@ -77,10 +77,10 @@ class Reading:
 
 
 def read(content: bytes) -> Reading:
-    """Read a modelDescription.xml; what breaks FMI's rules is mended where it changes no number, and said.
+    """Read a modelDescription.xml; faults are repaired and reported where the repair changes no number.
 
-    Pure: no file is read but FMI's schemas. ComponentFileError: it breaks FMI's rules where there is no way round; all
-    problems, one a line.
+    The function is pure: it reads no file but FMI's schemas. Raise ComponentFileError with all problems, one a line, if
+    the content breaks FMI's rules beyond repair.
     """
     mended = amended(content, schema_folder())
     if mended.refusals:
@@ -90,10 +90,10 @@ def read(content: bytes) -> Reading:
         members.writestr(DESCRIPTION, mended.content)
     try:
         return Reading(read_model_description(archive, validate=False), mended.findings)
-    except MemoryError:  # no fault of the description
+    except MemoryError:  # not a fault of the description
         raise
     except Exception as error:
-        # FMPy raises plain Exception for what FMI's schema cannot say
+        # FMPy raises plain Exception for faults beyond FMI's schema
         raise ComponentFileError(f"{DESCRIPTION}: {error}") from error
 
 
@@ -103,7 +103,7 @@ def reading_of(path: Path) -> Reading:
     Raises
     ------
     ComponentFileError
-        The file is unsafe or its description breaks FMI's rules where there is no way round.
+        The file is unsafe, or its description breaks FMI's rules beyond repair.
     """
     content = (unpack(path).folder / DESCRIPTION).read_bytes()
     try:
@@ -128,34 +128,34 @@ def integrated(
     interval: float,
     step_finished: Callable[[float], bool] = lambda time: True,
 ) -> np.ndarray[Any, Any]:
-    """Return what an FMU for model exchange gives when FMPy's CVode integrates it.
+    """Return the results of an FMU for model exchange, integrated by FMPy's CVode.
 
     Parameters
     ----------
     path : Path
         The FMU.
     stop_time : float
-        The end, s, from time 0.
+        End of the run, s, from time 0.
     output : sequence of str
-        Variables, numbers.
+        Names of numeric variables.
     tolerance : float
         Relative tolerance of the integrator.
     start_values : mapping of str to float
-        Enumerations as integers.
+        Start values by variable name; enumerations as integers.
     interval : float
         Time between two rows, s; events have rows too.
     step_finished : callable
-        Given the time after each step; what it answers says whether to go on.
+        Function of the time, called after each step; it returns whether to go on.
 
     Returns
     -------
     ndarray
-        A structured array: `time`, then the variables.
+        A structured array with `time` and the variables.
 
     Raises
     ------
     ComponentError
-        The integrator or the FMU failed, with what FMPy says.
+        The integrator or the FMU failed; the message quotes FMPy.
     """
     folder = unpack(path).folder
     try:
@@ -173,21 +173,21 @@ def integrated(
             step_finished=lambda time, recorder: step_finished(time),
         )
     except Exception as error:
-        # FMPy raises plain Exception where a solver gives up
+        # FMPy raises plain Exception when a solver gives up
         raise ComponentError(f"{path.stem}: model exchange: {error}") from error
     return found
 
 
 @lru_cache(maxsize=4)
 def _description_in(folder: Path) -> ModelDescription:
-    """Return the model description of an unpacked FMU, whose folder is named by its content: read once."""
+    """Return the model description of an unpacked FMU, read once: its folder is named by its content."""
     return read((folder / DESCRIPTION).read_bytes()).description
 
 
 def _ignored_log(*message: object) -> None:
-    """Print nothing of what an FMU logs: FMPy prints each line between those of a command."""
+    """Drop a log message of an FMU: FMPy would print it between the lines of a command."""
 
 
 def schema_folder() -> Path:
-    """Return the folder of FMI's XML schemas, one folder in it for each version (`fmi2`, `fmi3`)."""
+    """Return the folder of FMI's XML schemas, with one folder for each version (`fmi2`, `fmi3`)."""
     return Path(fmpy.__file__).parent / "schema"

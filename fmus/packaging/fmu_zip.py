@@ -1,4 +1,4 @@
-"""Writes FMU archives that are equal, byte for byte, when their contents are."""
+"""Writing of FMU archives: equal contents give equal bytes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
 
-#: The earliest time a zip file can hold: contents alone decide the bytes of an archive.
+#: Earliest time that a zip file can hold, used for all members: only contents decide the bytes of an archive.
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 
 
@@ -20,7 +20,7 @@ def write_fmu(path: Path, members: Mapping[str, bytes]) -> None:
     Parameters
     ----------
     path : Path
-        The file; its folder is made.
+        File to write; its folder is made.
     members : mapping of str to bytes
         Contents by member name, `/` between folders.
 

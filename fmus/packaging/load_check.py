@@ -1,6 +1,6 @@
-"""Loads the binary of an FMU and reports what is wrong with it.
+"""Check of an FMU's binary by loading it.
 
-It is called in a process of its own, since the code of a broken FMU may do anything.
+It runs in a separate process, since the code of a broken FMU may do anything.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import Any
 from vibroimpact.fmus.packaging.build import fmi_headers
 
 EXPORTED = {"2": r"FMI2_Export\s+fmi2\w+TYPE\s+(fmi2\w+);", "3": r"FMI3_Export\s+fmi3\w+TYPE\s+(fmi3\w+);"}
-#: FMI 3.0 wants all functions in every FMU, FMI 2.0 only those of the interfaces that it has.
+#: Parts of FMI 2.0's header: FMI 2.0 requires only the functions of the FMU's interfaces, FMI 3.0 requires all.
 MODEL_EXCHANGE = re.compile(
     r"(?s)Functions for FMI2 for Model Exchange.*?Functions for FMI2 for Co-Simulation"
 )
 CO_SIMULATION = re.compile(r"(?s)Functions for FMI2 for Co-Simulation.*")
 WRONG_TOKEN = "{not the token of any model}"
-#: Functions, without their prefix, without which the importer of this package makes no instance for co-simulation.
+#: Functions, without their prefix, that this package's importer needs for an instance for co-simulation.
 NEEDED = {
     *("Instantiate", "InstantiateCoSimulation", "FreeInstance", "SetupExperiment", "EnterInitializationMode"),
     *("ExitInitializationMode", "Terminate", "Reset", "DoStep", "EnterEventMode", "EnterStepMode"),
@@ -52,10 +52,10 @@ class Fmi2Callbacks(Structure):
 
 
 def problems_of(facts: dict[str, Any]) -> list[Found]:
-    """Return what is wrong with a binary: the name of a grade, and a line.
+    """Return the problems of a binary, each with the name of its grade and a line.
 
     The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder), and
-    `any_token`: the binary is known to take every token.
+    `any_token` (whether the binary is known to accept every token).
     """
     name = Path(facts["binary"]).name
     try:
@@ -76,7 +76,7 @@ def _problems_of_interface(library: CDLL, facts: dict[str, Any]) -> Iterator[Fou
     missing = [function for function in required if not hasattr(library, function)]
     if missing:
         version = facts["fmi_version"]
-        # what lacks functions that nothing here calls runs all the same
+        # an FMU runs without functions that this importer never calls
         needed = runs and any(function[len("fmi2") :] in NEEDED for function in missing)
         text = f"{name}: expected all functions of FMI {version}, got none called {', '.join(missing)}."
         yield REFUSED if needed else REMARK, text
@@ -138,7 +138,7 @@ def _instantiate2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
     function.restype = c_void_p
     kind = c_int(0 if facts["interface"] == "ModelExchange" else 1)
     location = c_char_p(Path(facts["resources"]).as_uri().encode())
-    # FMI 2.0 keeps a pointer to the callbacks for as long as the instance lives: until this process ends
+    # FMI 2.0 keeps a pointer to the callbacks while the instance lives: until this process ends
     runtime = ctypes.cdll.msvcrt if sys.platform == "win32" else CDLL(None)
     allocate, free = Allocate(("calloc", runtime)), Free(("free", runtime))
     _kept.append(Fmi2Callbacks(Logger(lambda *_: None), allocate, free, StepFinished(), None))

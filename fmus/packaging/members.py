@@ -1,4 +1,4 @@
-"""What an FMU that is written for others holds: libraries, sources, description, documentation, resources, a run."""
+"""Members of an FMU for other tools: libraries, sources, description, documentation, resources, a run."""
 
 from __future__ import annotations
 
@@ -30,48 +30,48 @@ from vibroimpact.fmus.packaging.trial import FOLDER as REFERENCE
 from vibroimpact.fmus.packaging.trial import MANIFEST, RESULT, Trial, reference_members, tried
 from vibroimpact.fmus.shipped import component_folder, fmu_path
 
-#: The member that says how many of each repeated block the description has: lines such as `modes 8`.
+#: Member with the number of each repeated block in the description, in lines like `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"
-#: The member with the value references that a description's, which count from 1 on, stand for; as resources.h has it.
+#: Member with the value reference behind each reference of the description, from 1 on; its format is in resources.h.
 REFERENCES_MEMBER = "resources/references.txt"
-#: Where the icon is, by the version of FMI.
+#: Path of the icon for each version of FMI.
 ICONS = {"2.0": "model.png", "3.0": "terminalsAndIcons/icon.png"}
-#: The last second that has a year of four digits.
+#: Last second of the year 9999.
 YEAR_9999 = 253_402_300_799
-#: Digits at a token's end that are an export's own, as instance.h has them.
+#: Number of digits at the end of a token that differ between exports; instance.h has the same number.
 OWN_DIGITS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What an FMU is made of."""
+    """Ingredients of an FMU."""
 
     original: ComponentDescription
-    """As it is compiled in; `component` is as it is described."""
+    """The component as compiled; `component` is as described."""
     component: ComponentDescription
     fmi: str
-    """`3.0` or `2.0`."""
+    """Version of FMI, `3.0` or `2.0`."""
     edition: Edition | None
-    """None: a full description, for this package's own importer."""
+    """Edition of the export; None: a full description, for this package's own importer."""
     experiment: Experiment
-    """The run that is tried, and kept as a reference result."""
+    """Experiment of the trial run, which is kept as a reference result."""
     counts: Mapping[str, int] = field(default_factory=dict)
-    """How many of each repeated block are described, where that is not all."""
+    """Number of each repeated block in the description, where it is below the compiled number."""
     resources: Mapping[str, bytes] = field(default_factory=dict)
     """Further members, all below `resources/`."""
     platform: str | None = None
-    """As in `export_fmu`."""
+    """See `export_fmu`."""
     note: Note = lambda _: None
-    """Told what is compiled for another machine, and what the library warns of."""
+    """Function that gets a line about each compilation for another machine, and each warning of the library."""
 
 
 def component_of(name: str) -> ComponentDescription:
-    """Return a component as it is compiled in, by its name; an unknown name raises ComponentFileError."""
+    """Return a component as compiled, by its name; raise ComponentFileError for an unknown name."""
     return read_component(component_folder(name) / "variables.toml")
 
 
 def edition_of(experiment: Experiment, *, dated: bool = True) -> Edition:
-    """Return this version of the package; the date is now, or that of `SOURCE_DATE_EPOCH`."""
+    """Return the edition of this version of the package, dated now or by `SOURCE_DATE_EPOCH`."""
     seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
     moment = time.gmtime(min(int(seconds), YEAR_9999) if seconds.isdecimal() else None)
     date = time.strftime("%Y-%m-%dT%H:%M:%SZ", moment) if dated else ""
@@ -81,8 +81,8 @@ def edition_of(experiment: Experiment, *, dated: bool = True) -> Edition:
 def members_of(contents: Contents) -> dict[str, bytes]:
     """Return the members of an FMU.
 
-    ComponentFileError: the component was not built. ComponentError: there is no library for a platform, and nothing to
-    compile it with; or a trial of it ended without an answer. UsageError: the library refuses the start values.
+    Raise ComponentFileError if the component was not built, and UsageError if the library refuses the start values.
+    Raise ComponentError if a platform has no library and no compiler, or if the trial run ended without an answer.
     """
     original, fmi = contents.original, contents.fmi
     with zipfile.ZipFile(fmu_path(original.name, fmi)) as archive:
@@ -95,7 +95,7 @@ def members_of(contents: Contents) -> dict[str, bytes]:
     component = contents.component
     if fmi == "3.0" and (contents.edition is not None or resources):
         resources[REFERENCES_MEMBER], component = _numbered(component)
-    # a trial runs by FMI 3.0, where the token of an export says that it has a list of references
+    # the trial runs by FMI 3.0, where the token of an export announces a list of references
     trial_token = original.token if fmi == "2.0" else _own_token(original.token, resources)
     trial = tried(replace(component, token=trial_token), own, resources, contents.experiment)
     component = replace(component, token=_own_token(original.token, resources))
@@ -113,7 +113,7 @@ def members_of(contents: Contents) -> dict[str, bytes]:
 
 
 def _hidden_laws(contents: Contents) -> Iterator[str]:
-    """Yield the line that lets messages name only the laws that the description has."""
+    """Yield the line that limits the laws in messages to those of the description."""
     ports = {v.ports for v in contents.component.variables if v.repeat == "contact"}
     if "external" in {v.ports for v in contents.original.variables} - ports:
         yield "external_laws 0\n"
@@ -122,7 +122,7 @@ def _hidden_laws(contents: Contents) -> Iterator[str]:
 def _for_people(
     component: ComponentDescription, fmi: str, edition: Edition, trial: Trial
 ) -> dict[str, bytes]:
-    """Return the members that a person looks at in a tool: icon, terminals, page, reference result."""
+    """Return the members for a person with a tool: icon, terminals, page, reference result."""
     members = reference_members(trial) if trial.rows else {}
     icon = ICONS[fmi]
     members[icon] = component.source.with_name("icon.png").read_bytes()
@@ -151,9 +151,9 @@ def _for_people(
 
 
 def _numbered(component: ComponentDescription) -> tuple[bytes, ComponentDescription]:
-    """Return the list of value references, and the component whose are the places of its variables, from 1 on.
+    """Return the list of value references, and the component with the places of its variables as references, from 1.
 
-    OMSimulator takes the references in FMI 3.0's dependencies for places, and refuses those beyond the last.
+    OMSimulator takes the references in FMI 3.0's dependencies for places, and refuses larger ones.
     """
     variables = component.variables_of(3)
     lines = (f"{variable.value_reference}\n" for variable in variables)
@@ -162,9 +162,9 @@ def _numbered(component: ComponentDescription) -> tuple[bytes, ComponentDescript
 
 
 def _own_token(token: str, resources: Mapping[str, bytes]) -> str:
-    """Return a token of which the last digits follow from the resources.
+    """Return a token whose last digits depend on the resources.
 
-    libcosim takes two FMUs of one token for one, and gives both the resources of the first.
+    libcosim takes two FMUs with the same token for one FMU, and gives both the resources of the first.
     """
     if not resources:
         return token
@@ -175,7 +175,7 @@ def _own_token(token: str, resources: Mapping[str, bytes]) -> str:
 
 
 def _for_platforms(members: Mapping[str, bytes], contents: Contents) -> dict[str, bytes]:
-    """Return the members with libraries for other machines in place of that of this one, or beside it."""
+    """Return the members with libraries for other machines in addition to this machine's library, or instead of it."""
     here, component = this_platform(), contents.original
     platforms = chosen_platforms(contents.platform or "all")
     own = {name: content for name, content in members.items() if name.startswith("binaries/")}
@@ -183,5 +183,5 @@ def _for_platforms(members: Mapping[str, bytes], contents: Contents) -> dict[str
     binaries = members_for(
         lambda p: library_for(component, p, contents.note), component.name, platforms, contents.fmi
     )
-    # what a release leaves out is this machine's own, if it is none of those
+    # a release contains no library for this machine if the machine is no target: keep its own
     return rest | (own if contents.platform is None and here.name not in TARGETS else {}) | binaries

@@ -1,4 +1,4 @@
-"""How FMI names the machine this Python runs on, and those that an FMU can be made for."""
+"""FMI's names of this machine, and of the platforms that FMUs can be made for."""
 
 from __future__ import annotations
 
@@ -26,52 +26,52 @@ TARGETS = {
     "x86_64-darwin": "x86_64-macos",
     "aarch64-darwin": "aarch64-macos",
 }
-"""What zig calls the platforms that an export can be made for, by FMI 3.0's names; glibc 2.17 is of 2012."""
+"""Zig's names of the platforms that an export can be made for, by FMI 3.0's names; glibc 2.17 is of 2012."""
 FMI2_SYSTEMS = {"linux": "linux", "darwin": "darwin", "windows": "win"}
 
 
 @dataclass(frozen=True, slots=True)
 class Platform:
-    """A machine that an FMU can be made for, by the name that FMI 3.0 gives it: `x86_64-windows`."""
+    """A platform that an FMU can be made for, by its name in FMI 3.0: `x86_64-windows`."""
 
     name: str
 
     @property
     def system(self) -> str:
-        """`linux`, `darwin` or `windows`."""
+        """Operating system: `linux`, `darwin` or `windows`."""
         return self.name.rpartition("-")[2]
 
     @property
     def suffix(self) -> str:
-        """`.so`, `.dylib` or `.dll`."""
+        """Extension of a shared library: `.so`, `.dylib` or `.dll`."""
         return SUFFIXES[self.system]
 
     @property
     def target(self) -> str:
-        """What zig calls it."""
+        """Zig's name of the platform."""
         return TARGETS[self.name]
 
     def folder(self, fmi_version: str) -> str:
-        """Return its folder in `binaries/`; FMI 2.0 has no name for ARM but on macOS, where one file may hold both."""
+        """Return the folder in `binaries/`; FMI 2.0 names ARM only on macOS, where one file may serve both kinds."""
         if fmi_version.startswith("3") or (self.name.startswith("aarch64") and self.system != "darwin"):
             return self.name
         return f"{FMI2_SYSTEMS[self.system]}64"
 
 
 def this_platform() -> Platform:
-    """Return the machine that this Python runs on."""
+    """Return the platform of this Python."""
     return Platform(f"{architecture()}-{system()}")
 
 
 def system() -> str:
-    """Return `linux`, `darwin` or `windows`."""
+    """Return the operating system: `linux`, `darwin` or `windows`."""
     if sys.platform not in SYSTEMS:
         raise ComponentFileError(f"platform: expected one of {', '.join(SYSTEMS)}, got {sys.platform}.")
     return SYSTEMS[sys.platform]
 
 
 def architecture() -> str:
-    """Return `x86_64`, `aarch64` or `x86`: of this Python, which may be a 32-bit one on a 64-bit machine."""
+    """Return the architecture of this Python, which may be 32-bit on a 64-bit machine: `x86_64`, `aarch64` or `x86`."""
     machine = platform.machine().lower()
     if machine not in ARCHITECTURES:
         raise ComponentFileError(f"platform: expected one of {', '.join(ARCHITECTURES)}, got {machine}.")
@@ -80,7 +80,7 @@ def architecture() -> str:
 
 
 def library_suffix() -> str:
-    """Return `.so`, `.dylib` or `.dll`."""
+    """Return the extension of a shared library: `.so`, `.dylib` or `.dll`."""
     return SUFFIXES[system()]
 
 

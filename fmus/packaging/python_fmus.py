@@ -1,8 +1,8 @@
-"""Makes FMUs of Python code; the one place that calls pythonfmu.
+"""FMUs made of Python code; only this module calls pythonfmu.
 
-pythonfmu builds in a process of its own, since it runs the slave's file and leaves that file's folder on the
-module path. Its model description is then completed (units, initial unknowns, dependencies, a token that
-depends on the contents alone), which FMI's rules and this package's connections need.
+pythonfmu builds in a separate process, since it runs the slave's file and leaves that file's folder on the module path.
+This module then completes its model description, as FMI's rules and this package's connections require. It adds
+units, initial unknowns, dependencies, and a token that depends on the contents alone.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from vibroimpact.fmus.units import Unit
 SOURCES = Path(__file__).parents[1] / "python"
 USER_CONTACT_LAW = SOURCES / "user_contact_law"
 ORBIT_CONTROLLER = SOURCES / "orbit_controller"
-#: What the user's file is called inside the FMU.
+#: Name of the user's file inside the FMU.
 LAW_FILE = "contact_law.py"
 DESCRIPTION = "modelDescription.xml"
-#: What an orbit controller's plan is called inside the FMU.
+#: Name of an orbit controller's plan inside the FMU.
 PLAN_FILE = "plan.json"
-#: Longest time that pythonfmu, which runs the user's file, may take, s.
+#: Longest time for pythonfmu, which runs the user's file, s.
 BUILD_LIMIT = 120.0
 UNITS = {
     "displacement": Unit({"m": 1}),
@@ -55,18 +55,18 @@ CONTROLLER_UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class PythonFmu:
-    """What an FMU is made of."""
+    """Ingredients of an FMU."""
 
     script: Path
-    """The file with the slave's class, in a folder of its own that may be filled further."""
+    """The file with the slave's class, in a folder of its own to which files may be added."""
     extras: tuple[Path, ...]
     """Files and folders that go into the resources with it."""
     readme: Path
-    """What the FMU's documentation says."""
+    """Text of the FMU's documentation."""
     units: Mapping[str, Unit]
-    """Units of the variables that have one."""
+    """Units of the variables that have a unit."""
     blamed: str
-    """What messages of a build that fails begin with: the user's file."""
+    """Beginning of the messages of a failed build: the user's file."""
 
 
 def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
@@ -83,16 +83,16 @@ def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
     Returns
     -------
     Path
-        The FMU.
+        The written file.
 
     Raises
     ------
     ComponentError
         pythonfmu is not installed.
     ComponentFileError
-        The law has a mistake; the message has the line.
+        The law has a mistake; the message names the line.
     UsageError
-        A file cannot be read or written, or the FMU would take the place of the law.
+        A file cannot be read or written, or the FMU would overwrite the law.
     """
     law, output = Path(law), Path(output)
     if output.exists() and law.exists() and output.samefile(law):
@@ -113,14 +113,14 @@ def build_orbit_controller(plan: Mapping[str, Any], output: Path | str) -> Path:
     Parameters
     ----------
     plan : mapping
-        What the README of fmus/python/orbit_controller says: numbers that JSON can hold.
+        Plan in the form of the README of fmus/python/orbit_controller: numbers that JSON can hold.
     output : path
         The FMU file to write. Equal plans give equal bytes.
 
     Returns
     -------
     Path
-        The FMU.
+        The written file.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def build_orbit_controller(plan: Mapping[str, Any], output: Path | str) -> Path:
 def make_fmu(parts: PythonFmu, output: Path) -> Path:
     """Let pythonfmu make an FMU, complete its description and write it; equal parts give equal bytes.
 
-    ComponentFileError: the slave cannot be instantiated. UsageError: the file cannot be written.
+    Raise ComponentFileError if the slave cannot be instantiated, UsageError if the file cannot be written.
     """
     members = _built(parts)
     members["documentation/README.md"] = parts.readme.read_bytes()
@@ -152,7 +152,7 @@ def make_fmu(parts: PythonFmu, output: Path) -> Path:
 
 
 def require_pythonfmu() -> None:
-    """Raise ComponentError where pythonfmu is not installed."""
+    """Raise ComponentError if pythonfmu is not installed."""
     if importlib.util.find_spec("pythonfmu") is None:
         raise ComponentError(
             "pythonfmu: expected this package, which makes FMUs of Python code, got none. "
@@ -180,13 +180,13 @@ def _build(*words: str, parts: PythonFmu) -> None:
     if done.is_late:
         raise ComponentFileError(f"{parts.blamed}: expected to run within {BUILD_LIMIT:g} s, got no answer.")
     if done.code != 0:
-        raise ComponentFileError(f"{parts.blamed}: {_last_message(done.said)}")
+        raise ComponentFileError(f"{parts.blamed}: {_last_message(done.stderr)}")
 
 
 def _last_message(errors: str) -> str:
     lines = [line for line in errors.splitlines() if line.strip()]
     last = lines[-1] if lines else "pythonfmu failed without a message"
-    # inside an FMU the messages are formats
+    # messages inside an FMU are formats
     return last.removeprefix("ValueError: ").replace("%%", "%")
 
 
@@ -204,7 +204,7 @@ def _completed(members: Mapping[str, bytes], units: Mapping[str, Unit]) -> bytes
 def _add_units(root: ElementTree.Element, units: Mapping[str, Unit]) -> None:
     named = {unit.name: unit for unit in units.values() if unit.name}
     if named:
-        # the schema wants them just after the interface
+        # the schema requires them right after the interface
         interface = root.find("CoSimulation")
         place = 0 if interface is None else list(root).index(interface) + 1
         declared = [UnitDefinition(name, u.exponents, u.factor, u.offset) for name, u in named.items()]
@@ -228,12 +228,12 @@ def _add_dependencies(root: ElementTree.Element) -> None:
     initial = ElementTree.SubElement(structure, "InitialUnknowns")
     for unknown in outputs:
         unknown.set("dependencies", inputs)
-        # at the start of a run they follow from the parameters too
+        # at the start of a run the outputs also depend on the parameters
         ElementTree.SubElement(initial, "Unknown", {**unknown.attrib, "dependencies": given})
 
 
 def _token(members: Mapping[str, bytes], root: ElementTree.Element) -> str:
-    # pythonfmu's own token is another one each time, and its binary does not look at it
+    # pythonfmu's own token differs each time, and its binary ignores it
     root.set("guid", "")
     contents = {**members, DESCRIPTION: ElementTree.tostring(root)}
     digest = hashlib.sha256()

@@ -1,4 +1,4 @@
-"""Makes the Replay FMU: recorded channels as the outputs of a component."""
+"""The Replay FMU: recorded channels as the outputs of a component."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.members import Contents, component_of, edition_of, members_of
 from vibroimpact.fmus.units import Unit, si_unit
 
-#: The folder of the signal files, the list of them, and its first line, as native/replay/recording.c has them.
+#: Folder of the signal files, name of their list, and its first line; native/replay/recording.c has the same.
 FOLDER, LIST, FORMAT = "resources/signals", "signals.txt", "vibroimpact signals 2"
-#: Endings of a channel's further variables, and the variables that all channels share.
+#: Suffixes of a channel's further variables.
 ENDINGS = ("_rate", "_valid", "_gain", "_offset")
 SHARED = ("time", "time_shift")
 MOST_CHANNELS = 256
-#: Most samples of all channels and time axes together: 512 MiB, half of what an FMU may unpack to.
+#: Largest number of samples of all channels and time axes together: 512 MiB, half of the limit of an unpacked FMU.
 MOST_SAMPLES = 1 << 26
-#: Largest deviation of evenly spaced times from their grid, in intervals.
+#: Largest deviation of evenly spaced times from their grid, in intervals; with a larger one the times are stored.
 EVEN = 1e-6
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 
@@ -41,16 +41,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ReplaySignal:
-    """A signal to be played.
+    """A signal to play.
 
     Attributes
     ----------
     time : array_like, shape (sample,), or None
-        Instants of the samples, s, ascending strictly; None with `start` and `interval`.
+        Instants of the samples, s, strictly ascending; None with `start` and `interval`.
     values : array_like, shape (sample,)
-        In `unit`; NaN where there is none (a gap).
+        Samples in `unit`; NaN in a gap.
     unit : str
-        `m/s2`, `9.80665 m s-2`, as `units.si_unit` reads it; `1` for a pure number, which fits any connection.
+        Unit as `units.si_unit` reads it, `m/s2`, `9.80665 m s-2`; `1` for a pure number, which fits any connection.
     start, interval : float
         The first instant and the spacing of evenly spaced samples, s.
     """
@@ -63,7 +63,7 @@ class ReplaySignal:
 
     @classmethod
     def evenly(cls, values: ArrayLike, unit: str, interval: float, start: float = 0.0) -> Self:
-        """Return a signal with evenly spaced samples; parameters are the attributes."""
+        """Return a signal with evenly spaced samples; the parameters are the attributes."""
         return cls(None, values, unit, start, interval)
 
 
@@ -80,13 +80,13 @@ def build_replay(
     Parameters
     ----------
     signals : mapping of str to ReplaySignal
-        By the name of the output: letters, digits and underscores, a letter first.
+        Signals by the name of their output: letters, digits and underscores, beginning with a letter.
     output : path
         The FMU file to write. Equal signals give equal bytes.
     fmi : str
         `3.0` or `2.0`.
     platform, note
-        As in `export_fmu`.
+        See `export_fmu`.
 
     Returns
     -------
@@ -96,11 +96,11 @@ def build_replay(
     Raises
     ------
     UsageError
-        The signals contradict themselves (all problems, one on each line), or the file cannot be written.
+        The signals are contradictory (all problems, one a line), or the file cannot be written.
     ComponentFileError
         The component was not built.
     ComponentError
-        There is no library for a platform, and nothing to compile it with.
+        A platform has no library, and no compiler was found to build it.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def build_replay(
     if problems:
         raise UsageError("\n".join(f"replay: {problem}" for problem in problems))
     original = component_of(REPLAY)
-    # without a date: a dataset knows by its hash which signals were played
+    # no date: datasets identify the played signals by the hash of the file
     experiment = _experiment(arrays)
     contents = Contents(
         original,
@@ -131,7 +131,7 @@ def build_replay(
 
 @dataclass(frozen=True, slots=True)
 class _Arrays:
-    """A signal as it is stored: `times` is None where the samples are evenly spaced."""
+    """A signal as it is stored: `times` is None for evenly spaced samples."""
 
     values: Floats
     unit: Unit
@@ -173,7 +173,7 @@ def _name_problems(names: list[str]) -> Iterator[str]:
         if not _NAME.fullmatch(name):
             yield f"{name!r}: expected a name of letters, digits and underscores, a letter first."
         for variable in (name, *(name + ending for ending in ENDINGS)):
-            # some file systems do not tell capitals apart
+            # some file systems ignore capitals
             owner = taken.setdefault(variable.lower(), name)
             if owner != name:
                 yield f"{name}: its variable {variable} is taken by {owner}. Rename a channel."
@@ -247,7 +247,7 @@ def _described(original: ComponentDescription, arrays: Mapping[str, _Arrays]) ->
 
 
 def _ending(variable: Variable) -> str:
-    """Return what follows the channel's name in that of its variable: nothing for the value."""
+    """Return the suffix of a variable after its channel's name; empty for the value."""
     member = variable.shown_name.rpartition(".")[2]
     return "" if member == "value" else f"_{member}"
 

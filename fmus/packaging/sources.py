@@ -1,7 +1,7 @@
-"""A component's C sources as members of an FMU, so that any tool can compile it for a target of its own.
+"""A component's C sources as members of an FMU, so that any tool can compile it for another platform.
 
-Below `sources/` lie the rooms of the core, and all else beside them: `sources` is the only folder of headers, and
-the sizes are in a header, since FMI 2.0 has no way to tell a tool of either.
+The folders of the core and all other sources lie below `sources/`, the only folder of headers. The sizes are in a
+header. FMI 2.0 cannot pass further folders or definitions to a tool.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ SIZES_HEADER = "sizes.h"
 
 
 def source_members(component: ComponentDescription, fmi: str, native: Path = NATIVE) -> dict[str, bytes]:
-    """Return the members below `sources/` of an FMU; the adapter of the other version of FMI is left out.
+    """Return the members below `sources/` of an FMU, without the adapter of the other version of FMI.
 
-    The component is as it is compiled in, not one of an export: the value references are places in its table.
+    The component must be as compiled, not as edited for an export: value references are places in its table.
     """
     other = "fmi2" if fmi.startswith("3") else "fmi3"
     core = native / "core"
@@ -39,7 +39,7 @@ def source_members(component: ComponentDescription, fmi: str, native: Path = NAT
 
 
 def c_files(members: Mapping[str, bytes]) -> list[str]:
-    """Return the names of the files to compile, as a description has them: relative to `sources`."""
+    """Return the names of the files to compile, relative to `sources`, as a description lists them."""
     folder = "sources/"
     return [name.removeprefix(folder) for name in members if name.startswith(folder) and name.endswith(".c")]
 

@@ -1,7 +1,7 @@
-"""An export is tried before it is written: start values that its library refuses are told, and the run is kept.
+"""Trial of an export before it is written: it finds start values that the library refuses, and keeps the run.
 
-The run is the export's reference result, after the layered standard FMI-LS-REF (1.0.0-alpha.1): a file of the role
-`result`, which the manifest names.
+The run is the export's reference result, in the layered standard FMI-LS-REF (1.0.0-alpha.1): a file with the role
+`result`, named in the manifest.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from vibroimpact.fmus.packaging.trial_run import INSTANCE
 from vibroimpact.fmus.processes.call import call
 from vibroimpact.fmus.processes.python_child import ending
 
-#: Where the files of the layered standard are.
+#: Folder of the layered standard's files.
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST, RESULT = "fmi-ls-manifest.xml", "result.csv"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
-#: Steps of a reference result, and how many numbers it has at most where there are many outputs.
+#: Steps of a reference result, at most and at least; largest count of its numbers, which reduces the steps.
 MOST_INTERVALS, LEAST_INTERVALS, MOST_NUMBERS = 200, 20, 6000
-#: Longest time that a run may take, s.
+#: Longest time for a run, s.
 LIMIT = 120.0
 
 
@@ -38,13 +38,13 @@ class Trial:
     """A run of an export's library."""
 
     names: tuple[str, ...]
-    """The real outputs."""
+    """Names of the real outputs."""
     rows: Sequence[Sequence[float]]
-    """At each communication point the time, s, and their values."""
+    """Time, s, and values of the outputs at each communication point."""
     ended: str
-    """Why it ends before its time; empty where it does not."""
+    """Reason for an early end; empty if the run is complete."""
     warnings: tuple[str, ...]
-    """What the library warned of at the start."""
+    """Warnings of the library at the start."""
 
 
 def tried(
@@ -53,10 +53,10 @@ def tried(
     resources: Mapping[str, bytes],
     experiment: Experiment,
 ) -> Trial:
-    """Run a component as it is described, by this machine's library; nothing is set but what its resources say.
+    """Run a component as it is described, by this machine's library, with only its resources to set values.
 
-    UsageError: the library refuses the start values, with its own words. ComponentError: its process ended without an
-    answer.
+    Raise UsageError, with the library's own words, if it refuses the start values. Raise ComponentError if the process
+    ends without an answer.
     """
     chosen = [v for v in component.variables_of(3) if v.causality == "output" and v.type == "Float64"]
     chosen = [v for v in chosen if v.variability == "continuous" and not v.dimensions]
@@ -71,7 +71,7 @@ def tried(
             "library": str(path),
             "token": component.token,
             "resources": str(folder / "resources"),
-            # only a contact law of another FMU needs it, which nobody answers here
+            # event mode is needed only for contact laws of other FMUs, which nobody answers here
             "event_mode": component.event_mode and "contact" in component.repeats,
             "start": experiment.start_time,
             "stop": experiment.stop_time,
@@ -80,13 +80,13 @@ def tried(
         }
         answer = _answer(component.name, facts)
     if answer["refusal"]:
-        raise UsageError(f"{component.name}: {_said(answer['refusal'])}. Nothing was written.")
+        raise UsageError(f"{component.name}: {_text_of(answer['refusal'])}. Nothing was written.")
     names = tuple(v.name for v in chosen)
-    return Trial(names, answer["rows"], _said(answer["ended"]), tuple(map(_said, answer["warnings"])))
+    return Trial(names, answer["rows"], _text_of(answer["ended"]), tuple(map(_text_of, answer["warnings"])))
 
 
-def _said(message: str) -> str:
-    """Return what a library logged, without the names of instance and function."""
+def _text_of(message: str) -> str:
+    """Return a library's log message without the names of instance and function."""
     return message.split(": ", 2)[-1] if message.startswith(f"{INSTANCE}: ") else message
 
 
@@ -110,7 +110,7 @@ def reference_members(trial: Trial) -> dict[str, bytes]:
     writer.writerows([repr(value) for value in row] for row in trial.rows)
     content = table.getvalue().encode("utf-8")
     first, last = trial.rows[0][0], trial.rows[-1][0]
-    told = f"Outputs from {literal(first)} s to {literal(last)} s at {len(trial.rows)} points, nothing set"
+    summary = f"Outputs from {literal(first)} s to {literal(last)} s at {len(trial.rows)} points, nothing set"
     root = ElementTree.Element(
         "fmiReferences",
         {
@@ -126,7 +126,7 @@ def reference_members(trial: Trial) -> dict[str, bytes]:
         type="text/csv",
         source=RESULT,
         role="result",
-        description=told + (f"; ended there: {trial.ended}" if trial.ended else ""),
+        description=summary + (f"; ended there: {trial.ended}" if trial.ended else ""),
         checksum=hashlib.sha3_256(content).hexdigest().upper(),
     )
     ElementTree.register_namespace("fmi-ls", NAMESPACE)

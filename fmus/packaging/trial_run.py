@@ -1,6 +1,6 @@
-"""Runs the library of a component once, as an export describes it, and reports what it gave.
+"""One run of a component's library, as an export describes it, with a report of its results.
 
-It is called in a process of its own: a library that ends its process ends no other.
+It runs in a separate process: a library that ends its process ends no other.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from itertools import pairwise
 from typing import Any
 
 OK, WARNING = 0, 1
-#: What the instance is called; its messages begin so.
+#: Name of the instance; its messages begin with it.
 INSTANCE = "trial"
 Log = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
 
 class LibraryError(Exception):
-    """A call failed; the text is what the library said."""
+    """A call failed; the text is the library's message."""
 
 
 class Instance:
@@ -33,7 +33,7 @@ class Instance:
         function = self._library.fmi3InstantiateCoSimulation
         function.restype = c_void_p
         head = (c_char_p(INSTANCE.encode()), c_char_p(facts["token"].encode()))
-        # an absolute path that ends with a separator; what is logged is told in the answer
+        # an absolute path with a separator at its end; log messages go into the answer
         resources = c_char_p(facts["resources"].encode() + b"/")
         flags = (c_bool(False), c_bool(True), c_bool(self._event_mode), c_bool(True))
         found = function(*head, resources, *flags, None, c_size_t(0), None, self._log, None)
@@ -42,7 +42,7 @@ class Instance:
         self._instance = c_void_p(found)
 
     def initialize(self, start: float, stop: float) -> None:
-        """Set nothing, and begin."""
+        """Initialize the instance without setting any value."""
         times = (c_bool(False), c_double(0.0), c_double(start), c_bool(True), c_double(stop))
         self._call("EnterInitializationMode", *times)
         self._call("ExitInitializationMode")
@@ -52,7 +52,7 @@ class Instance:
             self._call("EnterStepMode")
 
     def step(self, time: float, size: float) -> bool:
-        """Step; return whether the end of the step was reached and nobody is asked for an answer there."""
+        """Take a step; return whether it reached its end without an event to answer."""
         event, end, early = c_bool(), c_bool(), c_bool()
         flags = (byref(event), byref(end), byref(early))
         self._call("DoStep", c_double(time), c_double(size), c_bool(True), *flags, byref(c_double()))
@@ -66,7 +66,7 @@ class Instance:
         return list(numbers)
 
     def free(self) -> None:
-        """End it."""
+        """End the instance."""
         self._call("Terminate")
         function = self._library.fmi3FreeInstance
         function.restype = None
@@ -82,12 +82,12 @@ class Instance:
 
 
 def trial(facts: dict[str, Any]) -> dict[str, Any]:
-    """Return what an instance gave.
+    """Return the results of a run of an instance.
 
-    The facts are what an `Instance` takes; `start` and `stop`, s; `intervals`, how many steps of equal size lie
-    between; and `references`, the value references of real variables. The answer has `refusal` (why there is no run, or
-    empty), `ended` (why it ends before the stop time, or empty), `warnings` (what was logged as such), `rows` (at each
-    communication point the time and the values).
+    The facts are those of an `Instance`, with `start` and `stop`, s, and `intervals`, the number of equal steps.
+    `references` are the value references of real variables. In the answer, `refusal` is the reason for no run, `ended`
+    the reason for an end before the stop time; both may be empty. `warnings` are the logged warnings. `rows` are the
+    time and the values at each communication point.
     """
     answer: dict[str, Any] = {"refusal": "", "ended": "", "warnings": [], "rows": []}
     start, stop, intervals = facts["start"], facts["stop"], facts["intervals"]

@@ -1,9 +1,9 @@
-"""The cache of unpacked FMUs is bounded in size and age; what a living process uses is never swept.
+"""The cache of unpacked FMUs, bounded in size and age; folders in use by a living process are never removed.
 
 A process holds a shared lock on each unpacked folder that it uses. The system releases the lock when the process dies,
-however it dies. A folder whose lock is free is swept where it was not used for long. Where the cache is too large, the
-longest unused go first. Windows cannot lock folders; a folder with a loaded library stays there, since it cannot be
-renamed.
+however it dies. A sweep removes folders with a free lock that were unused for long. If the cache is too large, the
+longest unused folders go first. Windows cannot lock folders; there a folder with a loaded library stays, since it
+cannot be renamed.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ if sys.platform != "win32":
     import fcntl
 
 MOST_BYTES = 4 * 2**30
-"""Bytes of all unpacked FMUs above which those that were not used for the longest time go."""
+"""Size of all unpacked FMUs, bytes, above which the longest unused are removed."""
 MOST_AGE = 30 * 86400.0
-"""Time since a process began to use an FMU, s, above which its unpacked copy goes; it is unpacked again when needed."""
+"""Time since a process last began to use an FMU, s, above which its copy is removed; it is unpacked again on demand."""
 UNPACKING = ".unpacking-"
-"""First letters of the names of folders that are being filled or removed."""
+"""Prefix of the names of folders that are being filled or removed."""
 SIZES = "sizes"
-"""File of the cache: a line `folder bytes` for each folder whose files were counted, so that each is counted once."""
+"""File of the cache with a line `folder bytes` for each measured folder, so that each is measured once."""
 _ENTRY = re.compile(r"[0-9a-f]{64}")
 _SIZE = re.compile(r"\d{1,15}", re.ASCII)
 _MOST_GONE = 100
-"""Lines of folders that are gone which the file of sizes may have in any case."""
+"""Number of lines of removed folders that the file of sizes may always keep."""
 _MOST_TRIES, _PAUSE = 500, 0.01
-"""Tries, and s between two, to lock a folder that another process sweeps: it renames it at once."""
+"""Tries, and pause between tries, s, to lock a folder under removal by another process, which renames it at once."""
 
 _held: dict[Path, int] = {}
 _most_held: list[int] = []
 
 
 def hold_at_most(count: int) -> None:
-    """Let this process, which runs no FMU itself, hold only the last few that it looked at."""
+    """Limit the folders that this process holds to the last few; for processes that run no FMU themselves."""
     _most_held[:] = [count]
 
 
 def hold(folder: Path) -> bool:
-    """Keep a folder from being swept for as long as this process lives; return whether it is there.
+    """Protect a folder from removal while this process lives; return whether the folder exists.
 
-    A child made by `fork` holds it too.
+    A child made by `fork` protects it too.
     """
     handle = _held.get(folder)
     if handle is not None:
@@ -68,14 +68,14 @@ def hold(folder: Path) -> bool:
 
 
 def let_go(folder: Path) -> None:
-    """Let a folder be swept by others."""
+    """Allow other processes to remove a folder."""
     handle = _held.pop(folder, None)
     if handle is not None:
         os.close(handle)
 
 
 def _is_at(handle: int, folder: Path) -> bool:
-    """Whether an open folder is the one that lies at a path."""
+    """Whether an open folder is still the folder at a path."""
     try:
         return os.path.samestat(os.fstat(handle), folder.lstat())
     except OSError:
@@ -83,7 +83,7 @@ def _is_at(handle: int, folder: Path) -> bool:
 
 
 def _locked(folder: Path) -> int | None:
-    """Return a handle of a folder with a shared lock; None where it is not there, or cannot be locked."""
+    """Return a handle of a folder with a shared lock; None if it is absent or cannot be locked."""
     for _ in range(_MOST_TRIES):
         handle = _opened(folder)
         if handle is None:
@@ -108,7 +108,7 @@ def _opened(folder: Path) -> int | None:
 
 
 def _try_lock(handle: int, *, shared: bool) -> bool | None:
-    """Lock an open folder; return whether that was possible, None where its file system has no locks."""
+    """Lock an open folder; return whether that was possible, None if its file system has no locks."""
     if sys.platform == "win32":
         return None
     try:
@@ -121,10 +121,10 @@ def _try_lock(handle: int, *, shared: bool) -> bool | None:
 
 
 def sweep(cache: Path, coming: int, abandoned_after: float) -> None:
-    """Remove what no living process uses: what killed ones left half unpacked, what is old, and what is too much.
+    """Remove unused folders: remains of killed processes, old folders, and the longest unused of a too large cache.
 
-    So many bytes are coming, about to be unpacked. A folder that is half unpacked, not locked and older than
-    `abandoned_after` (s) is nobody's.
+    `coming` bytes are about to be unpacked, and count as used. A partly unpacked folder that is unlocked and older than
+    `abandoned_after` (s) belongs to no process.
     """
     now, total, entries = time.time(), coming, []
     known = _known_sizes(cache)
@@ -147,7 +147,7 @@ def sweep(cache: Path, coming: int, abandoned_after: float) -> None:
 
 
 def _known_sizes(cache: Path) -> dict[str, int]:
-    """Return the bytes of each folder that an earlier sweep has counted; a line that says nothing is passed over."""
+    """Return the bytes of each folder that an earlier sweep measured; malformed lines are ignored."""
     try:
         lines = (cache / SIZES).read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
@@ -157,7 +157,7 @@ def _known_sizes(cache: Path) -> dict[str, int]:
 
 
 def _keep_sizes(cache: Path, known: Mapping[str, int], sizes: Mapping[str, int]) -> None:
-    """Keep sizes for the next sweep: new ones at the end, all anew where most are gone. Lost ones are counted again."""
+    """Append new sizes to the file, or rewrite it if most of its folders are gone; lost sizes are measured again."""
     new = {name: size for name, size in sizes.items() if name not in known}
     forgets = len(known) > 2 * len(sizes) + _MOST_GONE
     text = "".join(f"{name} {size}\n" for name, size in (sizes if forgets else new).items())

@@ -1,7 +1,7 @@
-"""Opens zip archives of strangers: what is unsafe in one is told before a byte of it is unpacked.
+"""Opening of untrusted zip archives: unsafe content is reported before a byte is unpacked.
 
-FMUs and SSPs are such archives. A member may neither lead out of the archive nor hide another one, and what all of
-them expand to is bounded. Everything here raises `ComponentFileError`.
+FMUs and SSPs are such archives. A member may neither lead out of the archive nor hide another one, and the unpacked
+size is bounded. Everything here raises `ComponentFileError`.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from pathlib import Path, PurePosixPath
 
 from vibroimpact.fmus.errors import ComponentFileError
 
-#: Most bytes that an archive may expand to, and most members: far above any real one.
+#: Largest unpacked size of an archive, bytes: far above any real one.
 EXPANSION_LIMIT = 1 << 30
 MEMBER_LIMIT = 10_000
-#: Most folders that a member may lie in, and most characters of its name that messages show.
+#: Largest number of nested folders of a member.
 DEEPEST = 50
 LONGEST_NAME = 100
-#: Characters of a library's reason in a message.
+#: Number of characters of a library's reason in a message.
 LONGEST_REASON = 200
-#: What the libraries that expand members raise on damaged ones, and on those of kinds they do not know.
+#: Exceptions of the libraries that unpack members, for damaged members and for unknown kinds.
 DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError),
     *(ValueError, RuntimeError, MemoryError),
@@ -34,9 +34,9 @@ DAMAGE = (
 
 
 def opened(path: Path, kind: str = "FMU") -> BufferedReader:
-    """Open a file that is to be an archive; `kind` is what messages call it."""
+    """Open the file of an archive; `kind` is the archive's name in messages."""
     try:
-        # opening a pipe would wait for somebody who writes into it
+        # opening a pipe would wait for a process that writes into it
         if not stat.S_ISREG(path.stat().st_mode):
             raise ComponentFileError(f"{path}: expected an {kind} file, got a folder or a device.")
         return path.open("rb")
@@ -66,22 +66,22 @@ def checked_members(
     needed: str = "modelDescription.xml",
     kind: str = "FMU",
 ) -> list[zipfile.ZipInfo]:
-    """Return the members of an archive where all of them are safe.
+    """Return the members of an archive; raise ComponentFileError unless all are safe.
 
     Parameters
     ----------
     path : Path
-        The archive's file, for messages.
+        File of the archive, for messages.
     archive : zipfile.ZipFile
     limit : int
-        Most bytes that it may expand to.
+        Largest allowed unpacked size, bytes.
     needed, kind : str
-        The member that it must have; what messages call the archive.
+        Member that the archive must have; name of the archive in messages.
 
     Raises
     ------
     ComponentFileError
-        With the first five of its problems.
+        An archive is unsafe; the message has the first five of its problems.
     """
     members = archive.infolist()
     problems = [f"member {_shown(m)} {problem}" for m in members for problem in _problems(m)]
@@ -92,7 +92,7 @@ def checked_members(
         problems.append(f"{size} bytes when unpacked, limit {limit}")
     if not any(place_of(member) == (needed,) for member in members if not is_folder(member)):
         problems.append(f"no {needed}")
-    # only names that are short and few are worth comparing
+    # comparing names makes sense only if they are short and few
     problems = problems or list(_clashes(members))
     if problems:
         raise ComponentFileError(
@@ -107,32 +107,32 @@ def is_folder(member: zipfile.ZipInfo) -> bool:
 
 
 def place_of(member: zipfile.ZipInfo) -> tuple[str, ...]:
-    """Return where a member lies, one way for `a/b`, `./a/b` and `a//b`; as the file system compares names."""
+    """Return the place of a member, equal for `a/b`, `./a/b` and `a//b`; with names compared as by the file system."""
     return PurePosixPath(os.path.normcase(member.filename).replace(os.sep, "/")).parts
 
 
 def damaged(path: Path, error: Exception, kind: str = "FMU") -> ComponentFileError:
-    """Return the refusal of an archive that a library finds damaged; its reason may quote names of any length."""
+    """Return the error for an archive that a library finds damaged; its reason may quote names of any length."""
     reason = shortened(str(error), LONGEST_REASON)
     return ComponentFileError(f"{path}: expected an intact {kind}, got a damaged one: {reason}.")
 
 
 def cut(text: object) -> str:
-    """Return what stands in a file as messages show it."""
+    """Return a value from a file as messages show it."""
     return shortened(repr(text), LONGEST_NAME)
 
 
 def shortened(text: str, longest: int) -> str:
-    """Return a text, or the beginning of a long one."""
+    """Return a text, shortened if it is long."""
     return text if len(text) <= longest else text[:longest] + "..."
 
 
 def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[str]:
-    """Yield what members would overwrite: others at their place, and files where others need a folder."""
+    """Yield members that would overwrite others: members at the same place, and files where others need a folder."""
     places = [place_of(member) for member in members]
     contents: dict[tuple[str, ...], tuple[bool, int, int]] = {}
     for member, place in zip(members, places, strict=True):
-        # the same member twice, as builds write it that list a folder twice; bytes are compared once unpacked
+        # builds that list a folder twice write a member twice; its bytes are compared once unpacked
         content = (is_folder(member), member.file_size, member.CRC)
         if contents.setdefault(place, content) != content:
             yield f"two members have the same name, {cut('/'.join(place))}"

@@ -1,1 +1,1 @@
-"""Python processes that this package starts, and what they and their starters say to each other."""
+"""Python processes that this package starts, and their communication with it."""

@@ -1,4 +1,4 @@
-"""A call in a process of its own, which may crash, hang, or be ended by what it loads."""
+"""A call in a separate process, which may crash, hang, or be ended by the code that it loads."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from vibroimpact.fmus.processes.process import Process
 from vibroimpact.fmus.processes.python_child import ending
 
 POLL_SECONDS = 0.5
-"""How often the waiting process looks up, s."""
+"""Interval at which the waiting process checks the call, s."""
 _CHILD = ("-m", "vibroimpact.fmus.processes.child")
 
 
 class ProcessDied(Exception):
-    """The process ended without an answer; the text says how."""
+    """The process ended without an answer; the text names its exit code or signal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Called:
-    """How a call ended."""
+    """Outcome of a call."""
 
     code: int
     """Exit code of its process (negative: the signal)."""
     answer: Any
-    """What the function returned, from JSON; None: the process ended before."""
-    said: str
-    """What the process wrote to its standard error."""
+    """Result of the function, from JSON; None: the process ended without one."""
+    stderr: str
+    """Text that the process wrote to its standard error."""
     is_late: bool
-    """Whether it took too long."""
+    """Whether the call exceeded its time limit."""
 
     @property
     def last_line(self) -> str:
-        """The last line that the process wrote to its standard error; empty: none."""
-        return (self.said.strip().splitlines() or [""])[-1]
+        """The last line that the process wrote to its standard error, or empty."""
+        return (self.stderr.strip().splitlines() or [""])[-1]
 
 
 def call(
@@ -53,20 +53,20 @@ def call(
     errors: Literal["dropped", "kept"] = "kept",
     folder: Path | None = None,
 ) -> Called:
-    """Call a function in a process that may crash or hang; nothing that it has started in its session outlives it.
+    """Call a function in a process that may crash or hang; nothing that the process starts in its session outlives it.
 
     Parameters
     ----------
     function : str
-        `package.module:function`, from what JSON can say to what JSON can say; or a module, which is run as a program.
+        `package.module:function`, with arguments and a result that JSON can hold; or a module to run as a program.
     *arguments
-        Those of the function, or the words after the program.
+        Arguments of the function, or of the program.
     seconds : float
-        Wall time that it may take, s.
+        Limit of the wall time, s.
     errors : str
-        Whether what it writes to its standard error is `kept` or `dropped`.
+        Whether its standard error is `kept` or `dropped`.
     folder : Path, optional
-        Its current folder in place of that of this process.
+        Current folder of the process; the default is the current folder of this process.
 
     Raises
     ------
@@ -74,30 +74,30 @@ def call(
         The process cannot be started.
     """
     with Process(*_CHILD, function, str(seconds), errors=errors, folder=folder) as process:
-        answer, said, is_late = _ended(process, json.dumps(arguments).encode(), seconds)
+        answer, stderr, is_late = _ended(process, json.dumps(arguments).encode(), seconds)
     try:
         found = json.loads(answer)
-    except ValueError:  # none, or one that was cut off
+    except ValueError:  # no answer, or an incomplete one
         found = None
-    return Called(process.returncode, found, said.decode(errors="replace"), is_late)
+    return Called(process.returncode, found, stderr.decode(errors="replace"), is_late)
 
 
 def call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a function of this package in a new process and return what it returns.
+    """Call a function of this package in a new process and return its result.
 
     Parameters
     ----------
     function : callable
-        Importable by its name, as its arguments and its result are picklable; it reads nothing of strangers.
+        Function that can be imported by name, with picklable arguments and result; it must not read untrusted data.
 
     Raises
     ------
     ProcessDied
-        When the process ended before the function did.
+        The process ended before the function did.
     Exception
-        What the function raised.
+        The exception of the function.
     """
-    # libraries warn nobody there, unless a person has asked for it
+    # libraries show no warnings there, unless a person has asked for them
     warned = [f"-W{option}" for option in ("ignore", *sys.warnoptions)]
     with Process(*warned, *_CHILD, errors="shared") as process:
         answer, _, _ = _ended(
@@ -112,7 +112,7 @@ def call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def _ended(process: Process, order: bytes, seconds: float) -> tuple[bytes, bytes, bool]:
-    """Give a process its order and wait for its end; return its answer, what it said, and whether it took too long."""
+    """Give a process its order and wait for its end; return its answer, its standard error, and whether it was late."""
     end = time.monotonic() + seconds
     process.say([LENGTH.pack(len(order)), order])
     # `communicate` would close the pipe, and so end the process
@@ -121,11 +121,11 @@ def _ended(process: Process, order: bytes, seconds: float) -> tuple[bytes, bytes
     try:
         while True:
             try:
-                answer, said = process.communicate(
+                answer, stderr = process.communicate(
                     timeout=max(0.0, min(POLL_SECONDS, end - time.monotonic()))
                 )
             except subprocess.TimeoutExpired as so_far:
-                if is_killed:  # what it has started has left its session, and holds a pipe open
+                if is_killed:  # a process outside of the session still holds a pipe open
                     return so_far.output or b"", so_far.stderr or b"", is_late
                 has_ended = process.poll() is not None
                 is_late = not has_ended and time.monotonic() >= end
@@ -134,7 +134,7 @@ def _ended(process: Process, order: bytes, seconds: float) -> tuple[bytes, bytes
                     process.kill_session()
                     end = math.inf
             else:
-                return answer, said or b"", is_late
+                return answer, stderr or b"", is_late
     finally:
         process.kill_session()
         process.wait()

@@ -1,7 +1,7 @@
-"""What a process does that this package has started: it keeps its pipes to itself, and ends when that of orders does.
+"""Child side of this package's processes: it keeps its pipes to itself, and ends when its pipe of orders closes.
 
-Run as `python -m vibroimpact.fmus.processes.child FUNCTION SECONDS` it answers one `call`, without arguments one
-`call_alone`: an order is its length and as many bytes, an answer all bytes up to the end of its pipe.
+`python -m vibroimpact.fmus.processes.child FUNCTION SECONDS` answers one `call`, without arguments one `call_alone`. An
+order is its length followed by as many bytes; an answer is all bytes up to the end of its pipe.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from collections.abc import Sequence
 from typing import Any
 
 STANDARD_INPUT, STANDARD_OUTPUT, STANDARD_ERROR = range(3)
-#: Length of an order, in front of it.
+#: Format of the length in front of an order.
 LENGTH = struct.Struct("<Q")
-#: Time beyond that of its caller after which a call is ended by the system, whoever has been killed meanwhile, s.
+#: Time beyond the caller's limit after which the system ends a call, even if its caller was killed, s.
 GRACE = 5.0
 
 
 def private_pipes(*, silent: bool = False) -> tuple[int, int]:
-    """Keep the pipes of orders and of answers; return their descriptors.
+    """Reserve the pipes of orders and of answers; return their descriptors.
 
-    Neither an FMU nor a program that it starts can read an order then, or hold the answers open. What they print goes
-    to standard error; `silent`: nowhere.
+    Then neither an FMU nor a program that it starts can read an order, or hold the pipe of answers open. Their output
+    goes to standard error, or nowhere if `silent`.
     """
     orders, answers = os.dup(STANDARD_INPUT), os.dup(STANDARD_OUTPUT)
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -40,9 +40,9 @@ def private_pipes(*, silent: bool = False) -> tuple[int, int]:
 
 
 def end_when_closed(orders: int) -> None:
-    """End this process, with all that it has started in its session, when the pipe of orders ends.
+    """End this process, and all others in its session, when the pipe of orders ends.
 
-    The process that has started this one closes it, or its end does.
+    The parent process closes the pipe, at the latest by its own end.
     """
     threading.Thread(target=_wait_for_end, args=(orders,), daemon=True).start()
 
@@ -55,7 +55,7 @@ def _wait_for_end(orders: int) -> None:
 
 
 def write_whole(pipe: int, rows: Sequence[Any]) -> None:
-    """Write bytes to a pipe, all of them."""
+    """Write rows of bytes to a pipe completely."""
     for row in rows:
         rest = memoryview(row)
         while rest:
@@ -63,7 +63,7 @@ def write_whole(pipe: int, rows: Sequence[Any]) -> None:
 
 
 def _order(orders: int) -> bytes:
-    """Return an order; where none comes whole, whoever gave it has ended, and this process does."""
+    """Return an order; end this process if the pipe ends before, since the caller is gone."""
     (size,) = LENGTH.unpack(_read_whole(orders, LENGTH.size))
     return _read_whole(orders, size)
 
@@ -79,7 +79,7 @@ def _read_whole(pipe: int, size: int) -> bytes:
 
 
 def _answer(name: str, seconds: float) -> None:
-    """Answer a call: JSON, of what a function returns; a module without one is run as a program."""
+    """Answer a call with the JSON of the function's result; a module without a function is run as a program."""
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, seconds + GRACE)
     orders, answers = private_pipes(silent=True)
@@ -96,7 +96,7 @@ def _answer(name: str, seconds: float) -> None:
 
 
 def _answer_alone() -> None:
-    """Answer a call of this package's own: a pickle, of what a function returns or raises."""
+    """Answer a call of this package's own with a pickle of the function's result or exception."""
     orders, answers = private_pipes()
     sys.path[:], order = pickle.loads(_order(orders))
     end_when_closed(orders)
@@ -104,7 +104,7 @@ def _answer_alone() -> None:
     try:
         answer: tuple[Any, Exception | None] = function(*arguments), None
     except Exception as error:
-        # It is the caller's, who gets it in the other process.
+        # the exception belongs to the caller, in the other process
         answer = None, error
     write_whole(answers, [pickle.dumps(answer)])
     os._exit(0)  # nothing that is left of an FMU needs to end

@@ -1,4 +1,4 @@
-"""A fork of this process: it has all that was imported here, does its work, and ends."""
+"""A fork of this process: it shares all imports, does its work, and ends."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from collections.abc import Callable
 
 
 def forked(work: Callable[[], object]) -> int:
-    """Let a fork of this process do its work and end, whatever becomes of it; return the number of its process.
+    """Let a fork of this process do its work and end in any case; return its process number.
 
-    The fork lacks the other threads. Objects of this process end with it, not in its copy: no collection comes while
-    the copy begins.
+    The fork lacks the other threads. Objects of this process are finalized here, not in the copy: garbage collection is
+    off while the copy begins.
 
     Raises
     ------
     OSError
-        The system has no room for it.
+        The system has no room for another process.
     """
     collects = gc.isenabled()
     gc.disable()
     try:
         with warnings.catch_warnings():
-            # of Python 3.12 and of libraries: that threads are lost
+            # Python 3.12 and libraries warn of lost threads
             warnings.simplefilter("ignore")
             process = os.fork()
         if process == 0:
@@ -37,5 +37,5 @@ def forked(work: Callable[[], object]) -> int:
             work()
             code = 0
         finally:
-            os._exit(code)  # nothing else of this process runs twice
+            os._exit(code)  # nothing else of this process may run twice
     return process

@@ -1,4 +1,4 @@
-"""A Python process in a session of its own: it streams its answers, and may outlive the process that has started it."""
+"""A Python process in a session of its own: it streams its answers, and may outlive its parent process."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ _ERRORS = {"dropped": subprocess.DEVNULL, "kept": subprocess.PIPE, "shared": Non
 
 
 class Process(subprocess.Popen[bytes]):
-    """A process that runs Python, with a pipe of orders to it and one of answers from it.
+    """A process that runs Python, with a pipe for orders and a pipe for answers.
 
-    Ctrl-C and the end of a terminal reach all processes of a session: this one does not hear them, and is ended by the
-    process that has started it. Whether it ends with that process is its own matter (`child.end_when_closed`).
+    Ctrl-C and the end of a terminal reach all processes of a session, but not this process; its parent ends it. The
+    child decides whether it ends with its parent (`child.end_when_closed`).
 
     Parameters
     ----------
     *arguments : str
-        Of Python: `-m` and a module, or a file, then what these are given.
+        Arguments of Python: `-m` and a module, or a file, followed by the program's own arguments.
     errors : str
-        What becomes of its standard error: `dropped`, `kept` to be read here, or `shared` with this process.
+        Use of its standard error: `dropped`, `kept` to be read here, or `shared` with this process.
     passed : sequence of int
-        Descriptors that it has too.
+        Further descriptors that the process inherits.
     environment : mapping, optional
-        Its own in place of that of this process.
+        Environment of the process; the default is the environment of this process.
     folder : Path, optional
-        Its current folder in place of that of this process.
+        Current folder of the process; the default is the current folder of this process.
 
     Raises
     ------
     OSError
-        It cannot be started.
+        The process cannot be started.
     """
 
     stdin: IO[bytes]
@@ -55,7 +55,7 @@ class Process(subprocess.Popen[bytes]):
         environment: Mapping[str, str] | None = None,
         folder: Path | None = None,
     ) -> None:
-        self._heard = b""
+        self._received = b""
         super().__init__(
             python_command(*arguments),
             stdin=subprocess.PIPE,
@@ -68,41 +68,41 @@ class Process(subprocess.Popen[bytes]):
         )
 
     def say(self, rows: Iterable[bytes | memoryview]) -> None:
-        """Write bytes; a process that is gone shows in its answers."""
+        """Write bytes to the process; if it is gone, its answers show that."""
         with suppress(BrokenPipeError):
             self.stdin.writelines(rows)
             self.stdin.flush()
 
     def line(self, seconds: float) -> str:
-        """Return the next line that it says; empty: none came in time, or none comes any more."""
+        """Return the next line of its answers; empty if none came in time, or the answers have ended."""
         end = time.monotonic() + seconds
-        while b"\n" not in self._heard:
+        while b"\n" not in self._received:
             if not select.select([self.stdout], [], [], max(end - time.monotonic(), 0.0))[0]:
                 return ""
             part = os.read(self.stdout.fileno(), 4096)
             if not part:
                 return ""
-            self._heard += part
-        line, _, self._heard = self._heard.partition(b"\n")
+            self._received += part
+        line, _, self._received = self._received.partition(b"\n")
         return line.decode(errors="replace").strip()
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines that it says, until its answers end."""
+        """Yield the lines of its answers until they end."""
         return _lines(self.stdout)
 
     def lines_of_errors(self) -> Iterator[str]:
-        """Yield the lines of its standard error, which is kept, until that ends."""
+        """Yield the lines of its standard error, which must be `kept`, until it ends."""
         assert self.stderr is not None
         return _lines(self.stderr)
 
     def end(self, seconds: float) -> int:
-        """Close the pipe of orders; kill its session where it has not ended after a time, s; return its exit code."""
-        with suppress(BrokenPipeError):  # what was still to be said has no reader any more
+        """Close the pipe of orders; kill the session if the end takes longer than `seconds`; return the exit code."""
+        with suppress(BrokenPipeError):  # the unsent rest has no reader any more
             self.stdin.close()
         return self._killed_after(seconds)
 
     def interrupt(self, seconds: float) -> int:
-        """End it as Ctrl-C does; kill its session where it has not ended after a time, s; return its exit code."""
+        """End the process as Ctrl-C does; kill the session after `seconds` without its end; return the exit code."""
         self.send_signal(signal.SIGINT)
         return self._killed_after(seconds)
 
@@ -114,7 +114,7 @@ class Process(subprocess.Popen[bytes]):
             return self.wait()
 
     def kill_session(self) -> None:
-        """Kill it with all that it has started in its session, also what is left there after its end."""
+        """Kill all processes of its session, also those left after its own end."""
         if sys.platform == "win32":
             self.kill()
             return

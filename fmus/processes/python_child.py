@@ -1,7 +1,7 @@
-"""Python processes that this package starts: none of them imports files that lie in the current folder.
+"""Python processes that this package starts: they import no files from the current folder.
 
-`python -m` and `python -c` put the current folder first on the module path. A person's `queue.py` beside a scene, or a
-stranger's `scipy.py` beside a recording, would be imported in place of what it is named after.
+`python -m` and `python -c` put the current folder first on the module path. A user's `queue.py` next to a scene, or a
+stranger's `scipy.py` next to a recording, would replace the module of the same name.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ SAFE_PATH = "PYTHONSAFEPATH"
 
 
 def python_command(*arguments: str) -> list[str]:
-    """Return the command that runs this Python with arguments, the current folder off its module path."""
+    """Return the command that runs this Python with arguments, without the current folder on its module path."""
     return [sys.executable, "-P", *arguments]
 
 
 @contextmanager
 def safe_module_path() -> Iterator[None]:
-    """Keep the current folder off the module path of the Python processes that libraries start meanwhile.
+    """Keep the current folder off the module path of Python processes that libraries start inside this context.
 
-    For processes whose command is not ours to choose: those of Dask and multiprocessing. They do not run the script of
-    this process again either, as multiprocessing would to find what is defined in it: one that starts a campaign
-    outside of `if __name__ == "__main__"` would start another in every worker.
+    This serves processes whose command is not ours to choose: those of Dask and multiprocessing. They do not rerun the
+    script of this process either, as multiprocessing would for its definitions. A script that starts a campaign outside
+    of `if __name__ == "__main__"` would start another campaign in every worker.
     """
     before = os.environ.get(SAFE_PATH)
     os.environ[SAFE_PATH] = "1"
@@ -42,10 +42,10 @@ def safe_module_path() -> Iterator[None]:
 
 @contextmanager
 def no_library_warns() -> Iterator[None]:
-    """Let no warning of a library be shown by the Python processes that libraries start meanwhile.
+    """Hide warnings of libraries in Python processes that libraries start inside this context.
 
-    Python's resource tracker is one of them: it warns of the semaphores of a command that was killed, and removes them.
-    Options of a person (`python -W`, PYTHONWARNINGS) come after this one, and so go before it.
+    Python's resource tracker is such a process: it warns of the semaphores of a killed command, and removes them. A
+    user's own options (`python -W`, PYTHONWARNINGS) come after this one and take precedence.
     """
     before = list(sys.warnoptions)
     sys.warnoptions.insert(0, "ignore")
@@ -69,7 +69,7 @@ def _nameless_main() -> Iterator[None]:
 
 
 def ending(code: int | None) -> str:
-    """Return in words how a process ended, by its exit code (negative: the signal).
+    """Return the end of a process in words, from its exit code (negative: the signal).
 
     >>> ending(3), ending(-9)
     ('ended with exit code 3', 'was ended by SIGKILL')

@@ -1,1 +1,1 @@
-"""What the operations of this package do on the command line, a module for each."""
+"""Implementations of this package's operations on the command line, one module each."""

@@ -1,4 +1,4 @@
-"""What the commands of the client do: ask a service, and print what it answers."""
+"""Implementations of the client's commands: ask a service, and print its answer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.service.operations.submit import Submit
 
 
 def submit_scene(options: Submit) -> None:
-    """Submit a scene, with recordings that are uploaded before it; the id is the one line of standard output."""
+    """Submit a scene after uploading its recordings; the id is the only line on standard output."""
     with Service(options.service, folder=options.data) as service:
         fitted = [service.upload_recording(path) for path in options.recording or ()]
         scored = [service.upload_recording(path) for path in options.score or ()]
@@ -37,7 +37,7 @@ def submit_scene(options: Submit) -> None:
 
 
 def show_status(options: Status) -> None:
-    """Print where one campaign is, or all."""
+    """Print the state of one campaign, or of all."""
     with Service(options.service, folder=options.data) as service:
         if options.name is not None:
             say(_line(service.job(options.name).status))

@@ -1,4 +1,4 @@
-"""Arguments that operations of the service's client share, worded once."""
+"""Arguments that operations of the service's client share."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Url = Annotated[
     Option(
         "--service",
         metavar="URL",
-        help="Of the service; by default $VIBROIMPACT_SERVICE, else that in --data, else 127.0.0.1:8737.",
+        help="Address of the service; default $VIBROIMPACT_SERVICE, then the one in --data, then 127.0.0.1:8737.",
     ),
 ]
 Folder = Annotated[
     Path | None,
-    Option("--data", help="Folder of the service, which has its token and URL; else $VIBROIMPACT_TOKEN."),
+    Option("--data", help="Folder of the service, with its token and URL; default $VIBROIMPACT_TOKEN."),
 ]
 Name = Annotated[str, Positional(help="The id that `submit` printed.", metavar="ID")]

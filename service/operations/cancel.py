@@ -1,4 +1,4 @@
-"""Operation `cancel`: a campaign of a service ends."""
+"""Operation `cancel`: end a campaign of a service."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vibroimpact.service.operations.packages import ServiceOperation
 
 @operation("service.commands.asking:cancel_campaign")
 class Cancel(ServiceOperation):
-    """Cancel a campaign; what it has computed stays with the service.
+    """Cancel a campaign; its results so far stay with the service.
 
     Example: vibroimpact cancel 0123456789abcdef0123456789abcdef --data service
     """

@@ -1,4 +1,4 @@
-"""Operation `fetch`: the dataset of a campaign of a service into a file."""
+"""Operation `fetch`: write the dataset of a service's campaign to a file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.service.operations.packages import ServiceOperation
 
 @operation("service.commands.asking:fetch_dataset")
 class Fetch(ServiceOperation):
-    """Fetch the dataset of a campaign that is done.
+    """Fetch the dataset of a finished campaign.
 
     Example: vibroimpact fetch 0123456789abcdef0123456789abcdef -o bifurcation.nc --data service
     """

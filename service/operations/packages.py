@@ -1,4 +1,4 @@
-"""Operations whose packages are an extra of this one: they are refused where these are missing."""
+"""Operations that need packages of an extra: without these packages they are refused."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ServiceOperation(Operation):
     needs: ClassVar[tuple[str, ...]] = ("httpx",)
 
     def carry_out(self, **how: Any) -> None:
-        """Call the function that the operation names; raise UsageError first, if a package is missing."""
+        """Call the function that the operation names; first raise UsageError if a package is missing."""
         missing = [module for module in self.needs if find_spec(module) is None]
         if missing:
             raise UsageError(

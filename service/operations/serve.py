@@ -1,4 +1,4 @@
-"""Operation `serve`: the service, on one folder and one port."""
+"""Operation `serve`: run the service on one folder and one port."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.service.operations.packages import ServiceOperation
 
 @operation("service.serving:serve")
 class Serve(ServiceOperation):
-    """Run the service: campaigns over HTTP, one after the other, resumed after anything.
+    """Run the service: campaigns over HTTP, one after the other, resumed after any interruption.
 
     Example: vibroimpact serve --data service --port 8737
     """
@@ -25,12 +25,12 @@ class Serve(ServiceOperation):
         str | None, Option(help="Use the workers of this Dask scheduler (tcp://host:8786).")
     ] = None
     allow_remote: Annotated[
-        bool, Option("--allow-remote", help="Listen on an address that others reach.")
+        bool, Option("--allow-remote", help="Allow an address that other machines can reach.")
     ] = False
     allow_fmu_upload: Annotated[
-        bool, Option("--allow-fmu-upload", help="Take FMUs, native code that runs with your rights.")
+        bool, Option("--allow-fmu-upload", help="Accept FMUs: native code that runs with your rights.")
     ] = False
     allow_host: Annotated[
         list[str] | None,
-        Option(metavar="NAME", help="Name by which others reach it, as through a proxy; repeat it."),
+        Option(metavar="NAME", help="Further host name of the service, for example of a proxy; repeatable."),
     ] = None

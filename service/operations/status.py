@@ -1,4 +1,4 @@
-"""Operation `status`: where the campaigns of a service are."""
+"""Operation `status`: show the states of a service's campaigns."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from vibroimpact.service.operations.packages import ServiceOperation
 
 @operation("service.commands.asking:show_status")
 class Status(ServiceOperation):
-    """Say where the campaigns of a service are.
+    """Show the states of a service's campaigns.
 
     Example: vibroimpact status --data service
     """
 
-    name: Annotated[str | None, Positional(help="The id of one; else all are listed.", metavar="[ID]")] = None
+    name: Annotated[str | None, Positional(help="Id of one; default: all are listed.", metavar="[ID]")] = None
     service: Url = None
     data: Folder = None

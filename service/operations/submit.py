@@ -1,4 +1,4 @@
-"""Operation `submit`: a scene becomes a campaign of a service."""
+"""Operation `submit`: submit a scene as a campaign of a service."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class Submit(ServiceOperation):
     service: Url = None
     data: Folder = None
     workers: Annotated[int | None, Option(min=1, help="Worker processes.")] = None
-    wait: Annotated[bool, Option("--wait", help="Follow it to its end.")] = False
+    wait: Annotated[bool, Option("--wait", help="Wait for the end of the campaign.")] = False
     recording: Annotated[
         list[Path] | None,
-        Option(help="Recording, or file to import, to upload and replay; repeat it."),
+        Option(help="Recording, or file to import, to upload and replay; repeatable."),
     ] = None
-    fit: Annotated[str | None, Option(help="Numbers of a replay to fit, with commas.")] = None
+    fit: Annotated[str | None, Option(help="Numbers of a replay to fit, by key, with commas.")] = None
     score: Annotated[
-        list[Path] | None, Option(help="Recording to upload and score that is not fitted; repeat it.")
+        list[Path] | None, Option(help="Recording to upload and score without fitting; repeatable.")
     ] = None

@@ -1,8 +1,8 @@
-// Requests to the service. The session is a cookie that no script can read; the token is sent once and forgotten.
+// Requests to the service. The session is a cookie that no script can read; the token is sent once and not kept.
 
 const PREFIX = "/api/v1";
 
-/** A request that was refused; `problems` are those of a scene, `status` is 0 where nobody answered. */
+/** A refused request; `problems` are the problems of a scene, `status` is 0 without an answer. */
 export class Refusal extends Error {
   constructor(message, status, problems = []) {
     super(message);
@@ -13,7 +13,7 @@ export class Refusal extends Error {
 
 const listeners = { lost: () => {}, unknown: () => {} };
 
-/** Say what happens when the service falls silent or answers again, and when it does not know us. */
+/** Set the handlers for a service that stops or resumes answering, and for a session that has ended. */
 export function watch(lost, unknown) {
   Object.assign(listeners, { lost, unknown });
 }
@@ -30,9 +30,9 @@ export function recordingPath(name, rest = "") {
   return `/recordings/${encodeURIComponent(name)}${rest}`;
 }
 
-/** Return a key under which a submission is accepted once. */
+/** Return a key that makes a submission count once. */
 export function newKey() {
-  const bytes = crypto.getRandomValues(new Uint8Array(16)); // randomUUID is there over TLS alone
+  const bytes = crypto.getRandomValues(new Uint8Array(16)); // randomUUID exists only over TLS
   return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
@@ -52,7 +52,7 @@ async function send(method, path, headers, body, signal) {
   throw new Refusal(told.detail ?? `${answer.status} ${answer.statusText}`, answer.status, told.problems);
 }
 
-/** Return the JSON that a request is answered with; null where there is none. */
+/** Return the JSON of an answer; null if it has none. */
 export async function ask(method, path, { body, headers = {}, signal } = {}) {
   const raw = body instanceof Blob;
   const sent = body === undefined || raw ? body : JSON.stringify(body);
@@ -73,10 +73,10 @@ export async function endSession() {
   await send("DELETE", "/session", {});
 }
 
-/** Be told whenever something happens to a campaign, over lost connections too. Returns how to stop. */
+/** Call a function at each event of a campaign, across lost connections; return a function that ends the calls. */
 export function follow(id, happened) {
   const source = new EventSource(PREFIX + campaignPath(id, "/events"));
-  // a stream begins with all that happened before, so its events say that one has to look, not what is now
+  // a stream begins with all past events: an event is a reason to ask for the state, not the state itself
   for (const kind of ["open", "state", "progress", "error"]) source.addEventListener(kind, happened);
   return () => source.close();
 }

@@ -1,4 +1,4 @@
-// One campaign: how far it is, its diagram, a point of it, what failed, and what can be done with it.
+// One campaign: its progress, its diagram, a point of it, its failures, and its actions.
 
 import { ask, campaignPath, follow } from "./api.js";
 import { Diagram } from "./diagram.js";
@@ -8,8 +8,8 @@ import { showPoint } from "./point.js";
 import { Results } from "./results.js";
 
 const ENDED = ["done", "failed", "cancelled"];
-const PAUSE = 250; // milliseconds
-const TENTHS = 10; // a screen reader hears of every tenth of a campaign
+const PAUSE = 250; // milliseconds between two requests for the progress
+const TENTHS = 10; // number of reports of progress to screen readers
 
 export function showCampaign(main, id) {
   const view = new CampaignView(main, id);
@@ -61,7 +61,7 @@ class CampaignView {
     this.stop = ENDED.includes(this.job.state) ? () => {} : follow(this.id, () => this.look());
   }
 
-  /** Ask how far it is, once for all that happens within a pause. */
+  /** Request the progress, once for all events within a pause. */
   look() {
     this.timer ??= setTimeout(async () => {
       const job = await this.ask("GET");
@@ -138,7 +138,7 @@ class CampaignView {
       this.said.textContent = "";
       return await ask(method, campaignPath(this.id, rest));
     } catch (error) {
-      if (error.status !== 0) this.said.textContent = error.message; // else the banner says it
+      if (error.status !== 0) this.said.textContent = error.message; // otherwise the banner reports it
       return null;
     }
   }
@@ -160,7 +160,7 @@ class CampaignView {
     }
   }
 
-  /** Show what there is once a campaign has ended. */
+  /** Show the results once a campaign has ended. */
   async finish() {
     this.stop();
     if (this.job.kind === "run" && this.job.state === "done") showPoint(this.point, this.id, 0);
@@ -187,7 +187,7 @@ class CampaignView {
   }
 }
 
-/** Return what a job was asked beside its scene, as facts. */
+/** Return the options of a job besides its scene, as facts. */
 function askedFor({ fit, score, data, asked }) {
   const facts = {};
   if (fit) facts.Fitted = namesIn(fit).join(", ");

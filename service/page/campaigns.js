@@ -1,10 +1,10 @@
-// All campaigns, the newest first: how far each is, how fast, how long it will take.
+// All campaigns, the newest first: progress, speed, and remaining time.
 
 import { ask } from "./api.js";
 import { button, duration, element, kindOf, moment, short, stateBadge, titleOf } from "./dom.js";
 import { Pace } from "./pace.js";
 
-const EVERY = 1000; // milliseconds between two looks while one runs
+const EVERY = 1000; // milliseconds between two requests while a campaign runs
 const SELDOM = 4000;
 const ACTIVE = ["queued", "running", "cancelling"];
 
@@ -35,7 +35,7 @@ export function showCampaigns(main) {
       list.hidden = !items.length;
       nothing.hidden = Boolean(items.length);
     } catch (error) {
-      if (error.status !== 0) throw error; // the banner says that nobody answers
+      if (error.status !== 0) throw error; // the banner reports a missing answer
     } finally {
       const busy = items.some((job) => ACTIVE.includes(job.state));
       if (!ended) timer = setTimeout(look, busy ? EVERY : SELDOM);
@@ -63,7 +63,7 @@ function row(job, paces) {
     element("td", { class: "small muted" }, moment(job.created)));
 }
 
-/** Return a cell of a number; where there is no room for a head its unit is told beside it. */
+/** Return a cell with a number, and with its unit for layouts without headings. */
 function numbered(text, unit) {
   return element("td", { class: text === "–" ? "number nothing" : "number", "data-unit": unit }, text);
 }

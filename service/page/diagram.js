@@ -1,22 +1,22 @@
-// The diagram of a campaign: a variable over a swept parameter, or a map over two, growing while points land.
+// The diagram of a campaign: a variable over a swept parameter, or a map over two, growing as points finish.
 
 import { ask, campaignPath } from "./api.js";
 import { choice, element, inWords, short, table } from "./dom.js";
 import { Plot } from "./plot.js";
 import { coloursOf, extent } from "./scale.js";
 
-const PAUSE = 700; // milliseconds between two looks at what has landed
+const PAUSE = 700; // milliseconds between two requests for finished points
 const TABLE_ROWS = 200;
 const MAP = "map";
-const MOST = 12000; // rows that are drawn
-const DRAW = "draw"; // the dimension of points that are drawn
-const CLASS = "class"; // a variable of maps alone: its values are names
-const MAP_ROOM = 0.25; // part of what is shown of a map that is asked for beside it
+const MOST = 12000; // largest number of drawn rows
+const DRAW = "draw"; // dimension of randomly drawn points
+const CLASS = "class"; // a variable for maps only: its values are names
+const MAP_ROOM = 0.25; // margin of requested data around the visible part of a map, relative
 const FAILED = ["impact_limit", "error", "crash", "timeout"];
 const COLOURS = { up: "one", down: "two", independent: "one" };
 
 export class Diagram {
-  /** `picked(run)` is called for a point that was chosen. */
+  /** `picked(run)` is called for a selected point. */
   constructor(id, title, picked, height = 380) {
     Object.assign(this, { id, variable: null, along: null, direction: null, held: {}, levels: {}, within: {}, ended: false });
     this.controls = element("div", { class: "row end" });
@@ -31,7 +31,7 @@ export class Diagram {
     this.node = element("div", {}, this.controls, this.plot.node, this.said, this.details);
   }
 
-  /** Look at what has landed, soon; looks that are asked for meanwhile become one. */
+  /** Request the finished points, soon; requests in the meantime are merged. */
   refresh() {
     this.again = true;
     if (this.timer || this.looking) return;
@@ -81,7 +81,7 @@ export class Diagram {
     this.draw();
   }
 
-  /** Choose what is shown at first; return whether that asks for other values. */
+  /** Choose the initial view; return whether it needs other values. */
   begin(data) {
     const range = data.variables.find((one) => one.name === "displacement_range");
     const hasMap = spanning(data.axes).length > 1 && (range || !data.variable.along);
@@ -102,7 +102,7 @@ export class Diagram {
     this.plot.view = null;
   }
 
-  /** Return the two axes of a map: drawn keys, too, but one alone of those that are zipped. */
+  /** Return the two axes of a map; drawn keys count, and zipped keys count as one axis. */
   mapped() {
     const { axes } = this.data, spans = spanning(axes);
     return axes.filter((axis) => axis.along === DRAW || spans.includes(axis)).slice(0, 2);
@@ -117,7 +117,7 @@ export class Diagram {
   showControls() {
     const { variables, axes, directions, direction } = this.data;
     const state = JSON.stringify([this.variable, this.along, this.held, variables.length, this.levels.length]);
-    if (state === this.controlState) return; // a list that is open stays open
+    if (state === this.controlState) return; // keeps an open list open
     this.controlState = state;
     const usable = variables.filter((one) => (this.along === MAP ? !one.along : one.name !== CLASS));
     const made = [choice("Variable", usable.map((one) => [one.name, inWords(one)]), this.variable, (variable) => this.change({ variable }))];
@@ -139,7 +139,7 @@ export class Diagram {
     this.controls.replaceChildren(...made);
   }
 
-  /** Return the variable that is shown next: not all of them can be shown over an axis, or as a map. */
+  /** Return the next variable to show; some cannot be shown over an axis, or as a map. */
   variableOver(along) {
     if (along === MAP) return this.data.variable.along ? "displacement_range" : this.variable;
     return this.variable === CLASS ? null : this.variable;
@@ -199,7 +199,7 @@ export class Diagram {
 
   zoomed(view) {
     const shown = this.along === MAP ? this.mapped().map((axis) => axis.name) : [this.along];
-    const room = this.along === MAP ? MAP_ROOM : 0; // what lies beside a map colours its edge
+    const room = this.along === MAP ? MAP_ROOM : 0; // cells outside of a map colour its edge
     const wider = ([low, high]) => [low - room * (high - low), high + room * (high - low)];
     this.within = view ? Object.fromEntries(shown.map((name, place) => [name, wider([view.x, view.y][place])])) : {};
     this.refresh();
@@ -219,17 +219,17 @@ function middle(values) {
   return values[Math.floor(values.length / 2)];
 }
 
-/** Return where an axis lies: those that move together, or are drawn, lie along one dimension. */
+/** Return the dimension of an axis; axes that vary together, or are drawn, share one. */
 function placeOf({ name, along }) {
   return along || name;
 }
 
-/** Return the axes that span the sweep: the first of those that move together. */
+/** Return the axes that span the sweep, the first one of each group that varies together. */
 function spanning(axes) {
   return axes.filter((axis, number) => axes.findIndex((one) => placeOf(one) === placeOf(axis)) === number);
 }
 
-/** Whether two coordinates are those of a grid, of which not all points have to be there yet. */
+/** Whether two coordinates form a grid, some of whose points may be missing yet. */
 function isGrid(across, up, total) {
   return new Set(across).size * new Set(up).size <= total;
 }

@@ -1,6 +1,6 @@
-// Elements, numbers and words, as all views make them.
+// Elements, numbers and words for all views.
 
-/** Return an element: attributes, on* listeners, and children, of which text is never read as markup. */
+/** Return an element with attributes, on* listeners, and children; text is never parsed as markup. */
 export function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
@@ -16,7 +16,7 @@ export function button(text, action, attributes = {}) {
   return element("button", { type: "button", onclick: action, ...attributes }, text);
 }
 
-/** Return a table; cells that are numbers are set as such. */
+/** Return a table; cells with numbers are formatted as numbers. */
 export function table(caption, names, rows) {
   const cell = (one) => typeof one === "number"
     ? element("td", { class: "number" }, short(one))
@@ -37,7 +37,7 @@ export function field(label, control, help = null) {
     help && element("small", { class: "muted", id: `${control.id}-help` }, help));
 }
 
-/** Return a list to choose from, of pairs of a value and its text. */
+/** Return a list of choices from pairs of a value and its text. */
 export function choice(label, options, chosen, changed, help = null) {
   const select = element("select", { onchange: () => changed(select.value) },
     options.map(([value, text]) => element("option", { value, selected: value === chosen }, text)));
@@ -68,7 +68,7 @@ export function inWords({ label, units }) {
   return units && units !== "1" ? `${label} (${unitInWords(units)})` : label;
 }
 
-/** Return a unit as it is read: `m s-2` is m/s². */
+/** Return a unit for display: `m s-2` becomes m/s². */
 function unitInWords(units) {
   const parts = units.split(" ").map((part) => /^(\D+?)(-?\d*)$/.exec(part) ?? [part, part, ""]);
   const written = ([, name, power]) => name + ({ 2: "²", 3: "³", 4: "⁴" }[power.replace("-", "")] ?? "");
@@ -76,7 +76,7 @@ function unitInWords(units) {
   return [above.map(written).join(" ") || "1", ...below.map(written)].join("/");
 }
 
-/** Return what a job makes, in a word. */
+/** Return the kind of a job in a word. */
 export function kindOf({ kind, options }) {
   return options.fit ? "fit" : kind;
 }
@@ -99,7 +99,7 @@ export function stateBadge(state) {
   return element("span", { class: `state ${state}` }, state);
 }
 
-/** Tell a screen reader what has changed. */
+/** Report a change to screen readers. */
 export function tell(text) {
   const news = document.getElementById("news");
   if (news.textContent !== text) news.textContent = text;

@@ -1,9 +1,9 @@
-// An estimate of a recording or of a run: its form is made of what the service says of its API.
+// An estimate from a recording or a run: its form is made from the service's description of its API.
 
 import { ask, campaignPath, newKey, recordingPath } from "./api.js";
 import { choice, element, field, inTitle, titleOf } from "./dom.js";
 
-const CHANNELS = ["channel", "drive"]; // options that name one of a recording
+const CHANNELS = ["channel", "drive"]; // options whose value is a channel of a recording
 
 export function showEstimate(main, source = "", id = "") {
   const view = new EstimateView(source, id);
@@ -46,7 +46,7 @@ class EstimateView {
     this.fields.replaceChildren(element("div", { class: "fields" }, kinds), element("div", { class: "fields" }, made));
   }
 
-  /** Return the field of an option, after its JSON schema; `controls` has how its value is read. */
+  /** Return the field of an option, from its JSON schema; `controls` gets the function that reads its value. */
   control(key, schema) {
     const label = inTitle(key), help = schema.description, kind = schema.anyOf?.[0] ?? schema;
     const names = key === "events" ? this.named("events") : CHANNELS.includes(key) ? this.named("samples") : [];
@@ -85,7 +85,7 @@ class EstimateView {
   }
 }
 
-/** Return what was written: a text, a number, or several with commas between them; what is no number is sent as it is. */
+/** Return the input as a text, a number, or a list separated by commas; other input is sent unchanged. */
 function valueOf(text, type) {
   if (!text) return null;
   if (type === "array") return text.split(",").map((one) => valueOf(one.trim(), "number"));

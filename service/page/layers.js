@@ -1,8 +1,8 @@
-// What a plot is drawn of: points, lines, stems and the cells of a map, each on a canvas between two scales.
+// Layers of a plot: points, lines, stems and the cells of a map, each drawn on a canvas between two scales.
 
 import { colourOf } from "./scale.js";
 
-const GRAIN = 2; // pixels of a map of points that lie on no grid
+const GRAIN = 2; // size of a cell in a map of scattered points, pixels
 
 /** Draw one layer between the scales `x` and `y`, in the box of the plot. */
 export function drawLayer(pen, layer, x, y, colour, box) {
@@ -10,12 +10,12 @@ export function drawLayer(pen, layer, x, y, colour, box) {
   DRAWN[layer.kind](pen, layer, x, y, box);
 }
 
-/** Whether a layer is a map, which has a value everywhere. */
+/** Whether a layer is a map, with a value at every place. */
 export function isMap({ kind }) {
   return kind === "cells" || kind === "nearest";
 }
 
-/** Return columns with a gap at the first of the ascending `time` from each instant on: no line is drawn across a jump. */
+/** Return columns with a gap at each instant, before its first `time` (ascending), so that no line crosses a jump. */
 export function withGaps(columns, time, instants = []) {
   const jumps = new Set(instants.map((instant) => time.findIndex((one) => one >= instant)).filter((place) => place > 0));
   return columns.map((column) => column.flatMap((value, place) => (jumps.has(place) ? [null, value] : [value])));
@@ -67,7 +67,7 @@ const DRAWN = {
       pen.fill();
     }
   },
-  /** Each place has the colour of the nearest point: the first of two passes looks up and left, the second down and right. */
+  /** Colour each place as the nearest point: the first of two passes looks up and left, the second down and right. */
   nearest(pen, layer, x, y, box) {
     const { xs, ys, values } = layer;
     const wide = Math.ceil((box.right - box.left) / GRAIN), tall = Math.ceil((box.bottom - box.top) / GRAIN);
@@ -109,12 +109,12 @@ const DRAWN = {
   },
 };
 
-/** Return the colour of a cell of a map: that of its class, or of its value. */
+/** Return the colour of a cell of a map, by its class or its value. */
 function cellColour({ values, colours, range }, place) {
   return colours ? colours[values[place]] : colourOf((values[place] - range[0]) / (range[1] - range[0]));
 }
 
-/** Return of each value how far its cell reaches: half of the way to its neighbours. */
+/** Return the extent of each value's cell: half of the distance to its neighbours. */
 function edgesOf(values, logarithmic) {
   const sorted = [...new Set(values)].filter((value) => value !== null).sort((a, b) => a - b);
   const middle = logarithmic ? (a, b) => Math.sqrt(a * b) : (a, b) => (a + b) / 2;
@@ -128,7 +128,7 @@ function edgesOf(values, logarithmic) {
   }));
 }
 
-/** Draw the bar that says which colour is which value. */
+/** Draw the colour bar. */
 export function drawBar(pen, range, label, left, top, height, text, words) {
   for (let place = 0; place < height; place++) {
     pen.fillStyle = colourOf(1 - place / height);

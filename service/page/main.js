@@ -1,4 +1,4 @@
-// The page: which view is shown, who is signed in, whether the service answers.
+// The page: the current view, the session, and the availability of the service.
 
 import { ask, beginSession, endSession, Refusal, watch } from "./api.js";
 import { showCampaign } from "./campaign.js";
@@ -21,7 +21,7 @@ const VIEWS = {
 let close = () => {};
 let known = false;
 
-/** Show what the address names; a view returns what ends it. */
+/** Show the view that the address names; a view returns the function that ends it. */
 function route() {
   close();
   close = () => {};
@@ -42,7 +42,7 @@ function decoded(part) {
   try {
     return decodeURIComponent(part);
   } catch {
-    return part; // an address that somebody typed; no view knows it
+    return part; // an address typed by hand that no view knows
   }
 }
 

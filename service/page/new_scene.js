@@ -1,10 +1,10 @@
-// A new campaign: a scene that is written, pasted or dropped, checked while one types, its problems at their lines.
+// A new campaign: a scene is written, pasted or dropped, and checked during typing, with its problems at their lines.
 
 import { ask, askText, campaignPath, newKey, recordingPath } from "./api.js";
 import { button, element, field, namesIn, tell } from "./dom.js";
 
-const PAUSE = 300; // milliseconds of silence after which a scene is checked
-const LINE = 20; // pixels, as style.css has it
+const PAUSE = 300; // milliseconds without typing after which a scene is checked
+const LINE = 20; // height of a line, pixels; the same in style.css
 const LARGEST = 2 ** 20;
 const DRAFT = "vibroimpact-scene";
 const REPLAY = /^\s*\[replay\]/m;
@@ -73,7 +73,7 @@ class NewScene {
     examples.forEach((one, place) => this.templates.children[place].firstChild.append(element("small", {}, one.kind)));
   }
 
-  /** Begin with what another campaign was submitted as. */
+  /** Begin with the scene and options of another campaign. */
   async copy(from) {
     const { options, workers } = await ask("GET", campaignPath(from));
     this.write(await askText(campaignPath(from, "/scene")));
@@ -82,7 +82,7 @@ class NewScene {
     this.workers.value = workers ?? "";
   }
 
-  /** What is submitted is another campaign from here on. */
+  /** The next submission is another campaign. */
   renewed() {
     this.key = newKey();
   }
@@ -133,7 +133,7 @@ class NewScene {
     this.said.textContent = words;
   }
 
-  /** Number the lines; those with a problem stand out. */
+  /** Number the lines; highlight those with a problem. */
   number(problems) {
     const wrong = new Set(problems.map((one) => one.line));
     const count = this.text.value.split("\n").length;
@@ -183,7 +183,7 @@ class NewScene {
   }
 }
 
-/** Return a scene to begin a replay of a recording with: its first channel drives, its last one is compared. */
+/** Return a scene for the replay of a recording: its first channel drives, its last one is compared. */
 function replayOf({ name, channels }) {
   const sampled = channels.filter((one) => one.samples !== null).map((one) => one.name);
   const drive = sampled.length > 1 ? `drive = "base_acceleration"\nfrom = ${JSON.stringify(sampled[0])}\n` : "";

@@ -1,11 +1,11 @@
-// How fast a campaign goes, as the looks at it in the last seconds have seen.
+// Speed of a campaign, from its progress over the last seconds.
 
-const MEMORY = 10; // seconds
+const MEMORY = 10; // duration over which the speed is measured, seconds
 
 export class Pace {
   seen = [];
 
-  /** Note how far a campaign is now. */
+  /** Record the present progress of a campaign. */
   note({ done, state }) {
     const now = Date.now() / 1000;
     if (state !== "running" || done < (this.seen.at(-1)?.done ?? 0)) this.seen = [];
@@ -19,7 +19,7 @@ export class Pace {
     return first && last.at > first.at ? (last.done - first.done) / (last.at - first.at) : 0;
   }
 
-  /** Return the seconds that are left. */
+  /** Return the remaining seconds. */
   left({ done, total }) {
     return this.rate > 0 ? (total - done) / this.rate : NaN;
   }

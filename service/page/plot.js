@@ -1,17 +1,17 @@
-// A plot on a canvas: zoomed by dragging, keys or buttons; says the values under the pointer; a point can be chosen.
+// A plot on a canvas: zoomed by dragging, keys or buttons; it shows the values under the pointer; points are selectable.
 
 import { button, element, short, tell } from "./dom.js";
 import { drawBar, drawLayer, isMap } from "./layers.js";
 import { extent, scaleOf } from "./scale.js";
 
-const NEAR = 14; // pixels within which the pointer is on a point
-const DRAG = 6; // pixels from which on a press is a drag
+const NEAR = 14; // distance below which the pointer is on a point, pixels
+const DRAG = 6; // distance from which on a press is a drag, pixels
 const HELP = "Arrow keys go from point to point, Enter opens one, plus and minus zoom, 0 shows all.";
 
 export class Plot {
   /**
-   * `label` names it; `picked(layer, place)` is called for a point that was chosen; `zoomed(ranges)` after a zoom;
-   * `words(layer, place)` is what is said of a point.
+   * `label` names the plot; `picked(layer, place)` is called for a selected point; `zoomed(ranges)` after a zoom;
+   * `words(layer, place)` is the description of a point.
    */
   constructor(label, { height = 340, picked = null, zoomed = () => {}, words = null } = {}) {
     Object.assign(this, { label, height, picked, zoomed, words: words ?? this.plainWords });
@@ -47,14 +47,14 @@ export class Plot {
     for (const one of [this, ...this.beside]) one.draw();
   }
 
-  /** What is shown: what was zoomed to, else all that there is here and in the plots that are alike. */
+  /** Ranges of the axes: the zoom, else the full range of this plot and of the linked ones. */
   get ranges() {
     if (this.view) return this.view;
     const all = [this, ...this.alike].map((one) => one.extents);
     return { x: extent(all.map(({ x }) => x), 0), y: extent(all.map(({ y }) => y), 0) };
   }
 
-  /** The plots beside it that show the same quantities. */
+  /** Linked plots, which show the same quantities. */
   get alike() {
     const { x, y } = this.content;
     return this.beside.filter(({ content }) => content.x.label === x.label && content.y.label === y.label);
@@ -70,7 +70,7 @@ export class Plot {
     return { x: extent(xs, room || 0.01, x.log), y: extent(ys, room || 0.01, y.log) };
   }
 
-  /** Have the axes of other plots that show the same quantities, and be zoomed with them. */
+  /** Link this plot with others that show the same quantities: they share axes and zoom. */
   share(others) {
     this.beside = others;
     this.draw();
@@ -131,14 +131,14 @@ export class Plot {
     pen.restore();
   }
 
-  /** Draw what is chosen, and the box that is being dragged. */
+  /** Draw the selected point, and the box being dragged. */
   marks(pen, colour) {
     for (const one of [this.chosen, this.pointed]) {
       const layer = one && this.content.layers[one.layer];
       if (!layer || one.place >= layer.xs.length) continue;
       pen.beginPath();
       pen.arc(this.x.place(layer.xs[one.place]), this.y.place(layer.ys[one.place]), 6, 0, 7);
-      for (const [name, wide] of [["--raised", 5], ["--text", 2]]) { // it is seen on any colour
+      for (const [name, wide] of [["--raised", 5], ["--text", 2]]) { // two strokes are visible on any colour
         pen.strokeStyle = colour(name);
         pen.lineWidth = wide;
         pen.stroke();
@@ -226,7 +226,7 @@ export class Plot {
   }
 
   wheel(event) {
-    if (!event.ctrlKey && !event.metaKey) return; // the page scrolls
+    if (!event.ctrlKey && !event.metaKey) return; // the event scrolls the page
     event.preventDefault();
     this.zoomBy(event.deltaY > 0 ? 1.25 : 0.8, [event.offsetX, event.offsetY]);
   }
@@ -266,7 +266,7 @@ export class Plot {
   }
 }
 
-/** Return the legend of a map of classes; those that share a colour are one entry. */
+/** Return the legend of a map of classes; classes of the same colour share an entry. */
 function namesOf({ classes, colours }) {
   return [...new Set(colours)].map((colour) => {
     const key = element("span", { class: "key" }), same = classes.filter((_, place) => colours[place] === colour);

@@ -6,10 +6,10 @@ import { withGaps } from "./layers.js";
 import { Plot } from "./plot.js";
 
 const TABLE_ROWS = 200;
-const AGAIN = 1200; // milliseconds until a service that is busy is asked again
+const AGAIN = 1200; // milliseconds until a busy service is asked again
 const IMPACT = { impact_time: "Time", impact_phase: "Phase", impact_velocity: "Velocity", impact_impulse: "Impulse", impact_contact: "Stop", impact_restitution: "Restitution" };
 
-/** Show a point below `host`; of two that are asked for the later one is shown. */
+/** Show a point below `host`; of two requests the later one wins. */
 export async function showPoint(host, id, run, closed = null) {
   const mine = Symbol("question");
   host.asked = mine;
@@ -18,7 +18,7 @@ export async function showPoint(host, id, run, closed = null) {
   const head = element("div", { class: "head" }, element("h2", { tabindex: "-1" }, name), closed && button("Close", closed, { class: "last" }));
   const said = element("p", { class: "muted", role: "status" }, "Simulating …");
   host.replaceChildren(head, said);
-  if (closed) { // at once: what is done while it is simulated is not interrupted
+  if (closed) { // before the simulation, so that later actions of the user are not interrupted
     head.querySelector("h2").focus({ preventScroll: true });
     host.scrollIntoView({ block: "nearest" });
   }
@@ -68,7 +68,7 @@ function panel(title, plot) {
   return element("section", { "aria-label": title }, element("h3", { class: "small" }, title), plot.node);
 }
 
-/** Return the stops of a displacement as a layer, horizontal ones or upright ones. */
+/** Return the stops of a displacement as a layer of horizontal or vertical lines. */
 function stopsOf({ stops }, name, across) {
   return stops[name] ? [{ kind: "limits", colour: "limit", name: stops[name].length > 1 ? "stops" : "stop", at: stops[name], across, xs: [], ys: [] }] : [];
 }

@@ -1,4 +1,4 @@
-// The recordings that a service has: sent to it, looked at, replayed, estimated from, deleted.
+// The recordings of a service: uploaded, viewed, replayed, used for estimates, deleted.
 
 import { address, ask, recordingPath } from "./api.js";
 import { button, element, field, inWords, moment, namesIn, tell } from "./dom.js";
@@ -40,7 +40,7 @@ export function showRecordings(main) {
   look();
 }
 
-/** Return the part of the page that files are chosen in or dropped on. */
+/** Return the part of the page where files are chosen or dropped. */
 function sender(received) {
   const names = element("input", { type: "text", autocomplete: "off" });
   const units = element("input", { type: "text", autocomplete: "off" });

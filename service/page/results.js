@@ -1,9 +1,9 @@
-// What a job leaves: its figure, what it said, its files.
+// Results of a job: its figure, its log, its files.
 
 import { address, ask, askText, campaignPath } from "./api.js";
 import { choice, element, titleOf } from "./dom.js";
 
-const TOLD = ["replay", "estimate"]; // their results are their figure and what they say; others have a diagram or a motion
+const TOLD = ["replay", "estimate"]; // kinds whose results are figure and log; other kinds have a diagram or a motion
 
 export class Results {
   constructor(job) {
@@ -16,7 +16,7 @@ export class Results {
       element("h2", { id: "results-title" }, "Results"), this.files, this.figure, this.said);
   }
 
-  /** Show what there is of a job as it is now. */
+  /** Show the results of a job in its present state. */
   show(job) {
     this.readLog();
     if (this.shown === job.state) return;
@@ -40,7 +40,7 @@ export class Results {
     const begin = async () => {
       if (place.children.length) return;
       draw("auto");
-      const names = await figureKinds().catch(() => []); // the banner says that nobody answers
+      const names = await figureKinds().catch(() => []); // the banner reports a missing answer
       if (names.length) kinds.replaceChildren(choice("Kind of figure", names.map((name) => [name, name.replaceAll("-", " ")]), "auto", draw));
     };
     return element("details", { open: TOLD.includes(job.kind), ontoggle: begin }, element("summary", {}, "Figure"), kinds, place);
@@ -53,7 +53,7 @@ export class Results {
       const text = await askText(campaignPath(this.id, "/log"));
       this.log.textContent = text.replace(/ +$/gm, "") || "Nothing yet.";
     } catch (error) {
-      if (error.status !== 0) this.log.textContent = error.message; // else the banner says it
+      if (error.status !== 0) this.log.textContent = error.message; // otherwise the banner reports it
     } finally {
       this.reading = false;
     }
@@ -67,7 +67,7 @@ async function figureKinds() {
   return parameters.find(({ name }) => name === "kind").schema.enum;
 }
 
-/** Return a picture that the service draws, or why there is none. */
+/** Return a picture that the service draws, or the reason why there is none. */
 export function figure(path, text) {
   const made = element("img", { class: "figure", alt: text, src: address(path) });
   made.addEventListener("error", () => askText(path).catch((error) => made.replaceWith(element("p", { class: "problem" }, error.message))));

@@ -1,4 +1,4 @@
-// From numbers to places on the screen, and the ticks between them.
+// Conversion of numbers to places on the screen, and ticks between them.
 
 /** Return an axis from `low` to `high` over the pixels `from` to `to`. */
 export function scaleOf(low, high, from, to, logarithmic = false) {
@@ -31,7 +31,7 @@ function decades(low, high) {
   return found.length > 8 ? found.filter((_, place) => place % Math.ceil(found.length / 8) === 0) : found;
 }
 
-/** Return the lowest and highest of numbers, with some room around them. */
+/** Return the lowest and highest of numbers, with a margin. */
 export function extent(lists, room = 0.04, logarithmic = false) {
   let low = Infinity, high = -Infinity;
   for (const list of lists) {
@@ -59,9 +59,9 @@ export function colourOf(share) {
 
 const CLASSES = ["#0F4C81", "#56A5DC", "#3C7D3C", "#9BC46B", "#7A4B9A", "#C79BD6", "#8A6D00", "#E0B53A"];
 const OWN = { "no impacts": "#D9D9D9", chaos: "#B5410B", rest: "#8C8C8C", unknown: "#595959" };
-const OTHER = "#000000"; // of classes that are too many to be told apart
+const OTHER = "#000000"; // colour of further classes, beyond the distinguishable ones
 
-/** Return a colour for each class of motions, as the figures of `plot` have them: the first ones have one of their own. */
+/** Return a colour for each class of motion, as in the figures of `plot`: the first classes have their own colours. */
 export function coloursOf(classes) {
   const orbits = classes.filter((name) => !OWN[name]).slice(0, CLASSES.length).sort();
   return classes.map((name) => OWN[name] ?? CLASSES[orbits.indexOf(name)] ?? OTHER);

@@ -1,1 +1,1 @@
-"""The routes of the API, one concern a module; `described` has what they say alike."""
+"""The routes of the API, one concern a module; `described` holds their common parts."""

@@ -1,4 +1,4 @@
-"""How any job is accepted: 202 with its place, the same answer to the same key, 429 where too many wait."""
+"""Acceptance of any job: 202 with its place, the same answer to the same key, 429 when too many wait."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from pydantic import BaseModel
 
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import PREFIX, JobAnswer, job_answer
-from vibroimpact.service.store import Asked, KeyReusedError, QueueFullError, Store
+from vibroimpact.service.store import KeyReusedError, NewJob, QueueFullError, Store
 
 MOST_QUEUED = 100
-"""Jobs that wait, above which no more are accepted."""
+"""Number of waiting jobs above which no more are accepted."""
 RETRY_AFTER = 30
-"""Seconds after which a client that was refused may ask again."""
+"""Time after which a refused client may retry, s."""
 IdempotencyKey = Annotated[str | None, Header(alias="Idempotency-Key", min_length=1, max_length=200)]
 
 
-def accepted(store: Store, asked: Asked, given: BaseModel, response: Response, key: str | None) -> JobAnswer:
-    """Accept a job that a request asks for, and say in the response where it is."""
+def accepted(store: Store, new: NewJob, given: BaseModel, response: Response, key: str | None) -> JobAnswer:
+    """Accept the job of a request, and put its address into the response."""
     digest = hashlib.sha256(f"{type(given).__name__}{given.model_dump_json()}".encode()).hexdigest()
     try:
-        job, _ = store.submit(asked, key=key or "", digest=digest, most_queued=MOST_QUEUED)
+        job, _ = store.submit(new, key=key or "", digest=digest, most_queued=MOST_QUEUED)
     except QueueFullError:
         raise ProblemError(
             HTTPStatus.TOO_MANY_REQUESTS,

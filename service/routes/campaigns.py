@@ -21,16 +21,16 @@ from vibroimpact.service.routes.described import (
 )
 from vibroimpact.service.routes.scenes import refused_scene
 from vibroimpact.service.scenes import SOURCE, Shelf, Taken, linked, taken_scene, title_of
-from vibroimpact.service.store import ENDED, Asked, Kind, State, Store
+from vibroimpact.service.store import ENDED, Kind, NewJob, State, Store
 from vibroimpact.service.supervisor import Supervisor
 
 MOST_WORKERS = 256
-"""Processes that one campaign may ask for."""
+"""Largest number of processes for one campaign."""
 Reference = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Submission(BaseModel):
-    """A scene to be run."""
+    """A scene to run."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -38,19 +38,19 @@ class Submission(BaseModel):
     workers: Annotated[int | None, Field(ge=1, le=MOST_WORKERS, description="Worker processes.")] = None
     recordings: Annotated[
         list[Reference],
-        Field(max_length=100, description="Replayed by a scene with [replay] that names none: names or ids."),
+        Field(max_length=100, description="Names or ids, for a scene with [replay] that names none."),
     ] = []
     fit: Annotated[
         str | None,
         Field(min_length=1, max_length=2000, description="Numbers of a replay to fit, by key, with commas."),
     ] = None
     score: Annotated[
-        list[Reference], Field(max_length=100, description="Recordings to score that are not fitted.")
+        list[Reference], Field(max_length=100, description="Recordings to score without fitting.")
     ] = []
 
 
 class JobPage(BaseModel):
-    """Jobs, the newest first, and where the next page begins."""
+    """Jobs, the newest first, and the start of the next page."""
 
     items: list[JobAnswer]
     next: int | None
@@ -67,13 +67,13 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         summary="Submit a scene",
     )
     def submit(given: Submission, response: Response, idempotency_key: IdempotencyKey = None) -> JobAnswer:
-        """Accept a scene, which is run after those before it. The same `Idempotency-Key` again is the same job."""
+        """Accept a scene, to run after those before it. The same `Idempotency-Key` again gives the same job."""
         try:
             taken = taken_scene(given.scene, shelf, given.recordings)
-            asked = _asked(given, taken, shelf)
+            new_job = _new_job(given, taken, shelf)
         except SceneError as error:
             raise refused_scene(error, given.scene) from None
-        return accepted(store, asked, given, response, idempotency_key)
+        return accepted(store, new_job, given, response, idempotency_key)
 
     @router.get(
         "/campaigns", responses=problems(HTTPStatus.UNPROCESSABLE_ENTITY), summary="List, the newest first"
@@ -90,7 +90,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         "/campaigns/{name}", responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY)
     )
     def status(name: str) -> JobAnswer:
-        """Say where a campaign is."""
+        """Return the state of a campaign."""
         return job_answer(known_job(store, name))
 
     @router.post(
@@ -99,7 +99,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
     )
     def cancel(name: str) -> JobAnswer:
-        """End a campaign that waits or runs; what it has computed stays, and can be resumed."""
+        """Cancel a waiting or running campaign; its results so far stay, and it can be resumed."""
         job = known_job(store, name)
         if not supervisor.cancel(name) and known_job(store, name).state in ENDED:
             raise ProblemError(
@@ -114,7 +114,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
     )
     def resume(name: str) -> JobAnswer:
-        """Go on with a campaign that was cancelled or has failed, from what is there."""
+        """Resume a cancelled or failed campaign from its results so far."""
         job = known_job(store, name)
         again = {"state": State.queued, "message": "", "ended": None, "attempts": 0}
         if not store.change(name, only_from=[State.cancelled, State.failed], **again):
@@ -130,7 +130,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
         responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
     )
     def delete(name: str) -> None:
-        """Forget a campaign that has ended, with its folder."""
+        """Delete a campaign that has ended, with its folder."""
         job = known_job(store, name)
         if not store.delete(name):
             raise ProblemError(
@@ -142,17 +142,17 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
     return router
 
 
-def _asked(given: Submission, taken: Taken, shelf: Shelf) -> Asked:
-    """Return the job that a submission makes."""
+def _new_job(given: Submission, taken: Taken, shelf: Shelf) -> NewJob:
+    """Return the job for a submission."""
     files, options = dict(taken.files), dict[str, Any]()
     if taken.kind == Kind.replay:
         options = {"fit": given.fit, "score": given.score}
         problems = [line for name in given.score for line in linked("score", name, shelf, files)]
     else:
-        beside = {"fit": given.fit, "score": given.score}
+        unused = {"fit": given.fit, "score": given.score}
         problems = [
             f"{SOURCE}: {name}: expected a scene with [replay] that sweeps nothing but recordings, got another."
-            for name, value in beside.items()
+            for name, value in unused.items()
             if value
         ]
     if given.score and given.fit is None:
@@ -160,4 +160,4 @@ def _asked(given: Submission, taken: Taken, shelf: Shelf) -> Asked:
     if problems:
         raise SceneError(problems)
     title = title_of(given.scene)
-    return Asked(taken.kind, title, taken.text, given.workers, files=files, options=options)
+    return NewJob(taken.kind, title, taken.text, given.workers, files=files, options=options)

@@ -1,4 +1,4 @@
-"""What all routes say alike: a job, a problem, and how a refusal is described."""
+"""Common parts of all routes: a job, a problem, and the description of a refusal."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from vibroimpact.service.problems import MEDIA_TYPE, ProblemError
 from vibroimpact.service.store import Job, Kind, State, Store
 
 PREFIX = "/api/v1"
-"""Of the paths of all routes but those that are no part of the API."""
+"""Prefix of all paths of the API."""
 MOST_PAGE = 200
-"""Items on one page of a list."""
+"""Largest number of items on one page of a list."""
 
 
 class JobAnswer(BaseModel):
@@ -36,7 +36,7 @@ class JobAnswer(BaseModel):
 
 
 class ProblemAnswer(BaseModel):
-    """RFC 9457."""
+    """Problem details of RFC 9457."""
 
     type: str
     title: str
@@ -45,7 +45,7 @@ class ProblemAnswer(BaseModel):
 
 
 def problems(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
-    """Return how a route is described to refuse."""
+    """Return the OpenAPI description of a route's refusals."""
     content = {MEDIA_TYPE: {"schema": ProblemAnswer.model_json_schema()}}
     always = (
         *(HTTPStatus.BAD_REQUEST, HTTPStatus.UNAUTHORIZED, HTTPStatus.REQUEST_ENTITY_TOO_LARGE),
@@ -55,12 +55,12 @@ def problems(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
 
 
 def job_answer(job: Job) -> JobAnswer:
-    """Return a job as it is told."""
+    """Return a job as clients see it."""
     return JobAnswer(**{name: getattr(job, name) for name in JobAnswer.model_fields})
 
 
 def known_job(store: Store, name: str) -> Job:
-    """Return a job; 404 where there is none of this id."""
+    """Return a job; answer 404 for an unknown id."""
     try:
         return store.job(name)
     except KeyError:

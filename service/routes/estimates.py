@@ -1,4 +1,4 @@
-"""Estimates of a recording, or of what a campaign has computed: jobs like any other."""
+"""Estimates from a recording, or from the results of a campaign: jobs like any other."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from vibroimpact.service.routes.accepting import IdempotencyKey, accepted
 from vibroimpact.service.routes.described import JobAnswer, problems
 from vibroimpact.service.routes.recordings import file_of, known_recording
 from vibroimpact.service.routes.results import dataset_of
-from vibroimpact.service.store import Asked, Kind, Store
+from vibroimpact.service.store import Kind, NewJob, Store
 
 Reference = Annotated[str | None, Field(min_length=1, max_length=200)]
 
 
 class EstimateRequest(BaseModel):
-    """What is to be estimated, and of what: of one of the two."""
+    """An estimate and its data: either a recording or a job."""
 
     model_config = ConfigDict(extra="forbid")
 
-    recording: Annotated[Reference, Field(description="Name or id.")] = None
-    campaign: Annotated[Reference, Field(description="The id of a job that is done.")] = None
+    recording: Annotated[Reference, Field(description="Name or id of a recording.")] = None
+    campaign: Annotated[Reference, Field(description="Id of a finished job.")] = None
     estimate: Estimate
 
 
 def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
-    """Return the route that asks for an estimate."""
+    """Return the route that accepts an estimate."""
     router = APIRouter(tags=["estimates"], route_class=BoundedRoute)
 
     @router.post(
@@ -55,14 +55,14 @@ def estimates_router(store: Store, recordings: RecordingStore) -> APIRouter:
         estimate = given.estimate.model_dump(mode="json")
         options = {"data": name, "asked": estimate}
         title = f"{estimate['kind']} of {name}"
-        asked = Asked(Kind.estimate, title, files={name: file}, options=options)
-        return accepted(store, asked, given, response, idempotency_key)
+        new_job = NewJob(Kind.estimate, title, files={name: file}, options=options)
+        return accepted(store, new_job, given, response, idempotency_key)
 
     return router
 
 
 def _data_of(given: EstimateRequest, store: Store, recordings: RecordingStore) -> tuple[str, Path]:
-    """Return what an estimate is made of: its name in the folder of the job, and its file."""
+    """Return the data of an estimate: their name in the folder of the job, and their file."""
     if given.recording is not None and given.campaign is None:
         recording = known_recording(recordings, given.recording)
         return recording.name, file_of(recordings, recording)

@@ -1,4 +1,4 @@
-"""What happens to a job, told while it happens: server-sent events."""
+"""Events of a job as they happen: server-sent events."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from vibroimpact.service.routes.described import known_job, problems
 from vibroimpact.service.store import ENDED, Event, Store
 
 LOOKS = 0.2
-"""Seconds between two looks for new events."""
+"""Interval between two checks for new events, s."""
 HEARTBEAT = 15.0
-"""Seconds of silence after which a stream of events says that it is alive."""
+"""Silence after which a stream of events sends a sign of life, s."""
 
 
 def events_router(store: Store) -> APIRouter:
@@ -46,13 +46,13 @@ def events_router(store: Store) -> APIRouter:
 
 
 async def _stream(store: Store, name: str, last: int, request: Request) -> AsyncIterator[str]:
-    """Yield the events of a job after one of them, those to come as well, until it has ended."""
+    """Yield the events of a job after a given one, including future ones, until the job has ended."""
     silent = 0.0
     while not await request.is_disconnected():
         try:
             found, ended = await asyncio.to_thread(_news, store, name, last)
         except KeyError:
-            return  # it was deleted
+            return  # the job was deleted
         for event in found:
             last, silent = event.id, 0.0
             yield _event_lines(event)
@@ -67,7 +67,7 @@ async def _stream(store: Store, name: str, last: int, request: Request) -> Async
 
 
 def _news(store: Store, name: str, last: int) -> tuple[list[Event], bool]:
-    """Return the events after one of them, and whether the job had ended before they were read: then they are all."""
+    """Return the events after a given one, and whether the job had ended before the read: then none will follow."""
     ended = store.job(name).state in ENDED
     return store.events(name, after=last), ended
 

@@ -20,7 +20,7 @@ from vibroimpact.service.sent_files import SentFile
 
 
 class Component(BaseModel):
-    """A component that a scene may name, and whether the package brings it or somebody has uploaded it."""
+    """A component that a scene may name, and whether it is part of the package or was uploaded."""
 
     name: str
     origin: Literal["package", "uploaded"]
@@ -32,7 +32,7 @@ def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
 
     @router.get("/fmus", responses=problems())
     def listed() -> list[Component]:
-        """List the components of the package and those that were uploaded."""
+        """List the components of the package and the uploaded ones."""
         own = [Component(name=name, origin="uploaded") for name in fmus.names()]
         return [Component(name=name, origin="package") for name in sorted(components())] + own
 
@@ -47,7 +47,7 @@ def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
         },
     )
     def fmu(name: str, fmi: Annotated[Literal["2.0", "3.0"], Query()] = "3.0") -> SentFile:
-        """Return a component as it is loaded here; `fmi` is for those of the package."""
+        """Return a component as the service loads it; `fmi` applies to components of the package."""
         path = Path(fmu_path(name, fmi)) if name in components() else fmus.find(name)
         if path is None:
             known = ", ".join([*sorted(components()), *fmus.names()])
@@ -72,11 +72,11 @@ def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
     async def upload(
         request: Request,
         response: Response,
-        name: Annotated[str, Query(pattern=NAME, description="By which scenes name it.")],
+        name: Annotated[str, Query(pattern=NAME, description="Name for scenes.")],
     ) -> Component:
-        """Take an FMU, of a law of one's own too, where the service was started with `--allow-fmu-upload`.
+        """Accept an uploaded FMU, also of a user's contact law, if the service was started with `--allow-fmu-upload`.
 
-        Its archive and its description are checked; nothing of it is loaded before a scene names it.
+        The service checks its archive and its description; no code of it is loaded before a scene names it.
         """
         if not fmus.takes_uploads:
             raise ProblemError(

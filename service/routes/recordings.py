@@ -1,4 +1,4 @@
-"""Recordings: uploaded, listed, looked at, deleted."""
+"""Recordings: uploaded, listed, drawn, deleted."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vibroimpact.service.routes.uploads import Upload, Uploads
 from vibroimpact.service.sent_files import SentFile
 
 MOST_SETTINGS = 4000
-"""Characters of import settings."""
+"""Largest number of characters of import settings."""
 
 
 class ChannelAnswer(BaseModel):
@@ -44,14 +44,14 @@ class RecordingAnswer(BaseModel):
 
 
 class RecordingPage(BaseModel):
-    """Recordings, the newest first, and where the next page begins."""
+    """Recordings, the newest first, and the start of the next page."""
 
     items: list[RecordingAnswer]
     next: int | None
 
 
 def known_recording(recordings: RecordingStore, name: str) -> StoredRecording:
-    """Return a recording by its id or its name; 404 where there is none."""
+    """Return a recording by its id or its name; answer 404 for an unknown one."""
     try:
         return recordings.find(name)
     except KeyError:
@@ -61,7 +61,7 @@ def known_recording(recordings: RecordingStore, name: str) -> StoredRecording:
 
 
 def file_of(recordings: RecordingStore, recording: StoredRecording) -> Path:
-    """Return the file of a recording; 409 where it has gone."""
+    """Return the file of a recording; answer 409 if it has gone."""
     try:
         return recordings.file(recording)
     except UsageError as error:
@@ -91,7 +91,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
         request: Request,
         response: Response,
         name: Annotated[
-            str, Query(pattern=NAME, description="Of the file; its ending helps to know its format.")
+            str, Query(pattern=NAME, description="Name of the file; its extension helps to find its format.")
         ],
         settings: Annotated[
             str,
@@ -100,9 +100,9 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
             ),
         ] = "{}",
     ) -> RecordingAnswer:
-        """Take a file of a measuring system, import it as `vibroimpact import` does, and keep the recording.
+        """Accept a file of a measuring system, import it as `vibroimpact import` does, and keep the recording.
 
-        The same file with the same name again is the same recording.
+        The same file with the same name again gives the same recording.
         """
         checked = _settings(settings)
         try:
@@ -126,7 +126,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
 
     @router.get("/recordings/{name}", responses=absent)
     def one(name: str) -> RecordingAnswer:
-        """Say what is in a recording, by its id or its name."""
+        """Return a description of a recording, by its id or its name."""
         return _answer(known_recording(recordings, name))
 
     @router.get(
@@ -155,7 +155,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
 
     @router.delete("/recordings/{name}", status_code=HTTPStatus.NO_CONTENT, responses=absent)
     def delete(name: str) -> None:
-        """Forget a recording; jobs that were submitted with it keep what they read."""
+        """Delete a recording; jobs that were submitted with it keep its data."""
         recordings.delete(known_recording(recordings, name))
 
     return router
@@ -166,7 +166,7 @@ def _answer(recording: StoredRecording) -> RecordingAnswer:
 
 
 def _settings(text: str) -> str:
-    """Return import settings as they are compared and handed on."""
+    """Return import settings in the form that is compared and passed on."""
     try:
         given: Any = json.loads(text)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""What a job has left: its scene, its log, its dataset, figures of it."""
+"""Results of a job: its scene, its log, its dataset, and figures of it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from vibroimpact.service.sent_files import SentFile
 from vibroimpact.service.store import LOG_FILE, Job, State, Store
 
 MOST_LOG = 2**20
-"""Of a log, the end that is shown, byte."""
+"""Length of the shown end of a log, byte."""
 
 
 def dataset_of(store: Store, name: str) -> tuple[Job, Path]:
-    """Return a job that is done, and its dataset; 409 where it is not."""
+    """Return a finished job and its dataset; answer 409 if the job is not finished."""
     job = known_job(store, name)
     path = store.dataset_of(job)
     if job.state != State.done:
@@ -36,16 +36,16 @@ def dataset_of(store: Store, name: str) -> tuple[Job, Path]:
 
 
 def results_router(store: Store) -> APIRouter:
-    """Return the routes of what a job has left."""
+    """Return the routes of a job's results."""
     router = APIRouter(tags=["results"])
     absent = problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY)
 
     @router.get("/campaigns/{name}/scene", response_class=PlainTextResponse, responses=absent)
     def scene(
         name: str,
-        fitted: Annotated[bool, Query(description="With the numbers that a fit has found.")] = False,
+        fitted: Annotated[bool, Query(description="Whether to return the fitted numbers.")] = False,
     ) -> Response:
-        """Return the scene that was submitted, or that which was fitted."""
+        """Return the submitted scene, or the fitted one."""
         known_job(store, name)
         path = store.folder_of(name) / "fitted.toml" if fitted else store.scene_of(name)
         if not path.is_file():
@@ -57,7 +57,7 @@ def results_router(store: Store) -> APIRouter:
 
     @router.get("/campaigns/{name}/log", response_class=PlainTextResponse, responses=absent)
     def log(name: str) -> Response:
-        """Return the end of what its process said."""
+        """Return the end of the log of the job's process."""
         known_job(store, name)
         path = store.folder_of(name) / LOG_FILE
         content = path.read_bytes()[-MOST_LOG:] if path.is_file() else b""

@@ -1,4 +1,4 @@
-"""Scenes that are checked and not run."""
+"""Scenes to check without running them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.service.scenes import Shelf, located, taken_scene
 
 
 class SceneText(BaseModel):
-    """A scene to be checked."""
+    """A scene to check."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -24,7 +24,7 @@ class SceneText(BaseModel):
 
 
 class SceneProblem(BaseModel):
-    """One problem of a scene, and where it is."""
+    """One problem of a scene, and its line and column."""
 
     message: str
     line: int
@@ -32,7 +32,7 @@ class SceneProblem(BaseModel):
 
 
 class Validation(BaseModel):
-    """What is wrong with a scene: nothing, where there are no problems."""
+    """The problems of a scene; a valid scene has none."""
 
     problems: list[SceneProblem]
 

@@ -1,4 +1,4 @@
-"""The body of a request as a file: streamed to the disk, whole or not there at all."""
+"""The body of a request as a file: streamed to the disk, whole or not at all."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from vibroimpact.service.memory import imports_at_once
 from vibroimpact.service.problems import ProblemError
 
 MOST_RECEIVED = 16
-"""Uploads whose bodies are received at a time; others wait for their turn before their bodies are read."""
+"""Number of uploads whose bodies are received at the same time; further uploads wait before their bodies are read."""
 STALLED_SECONDS = 30.0
-"""Silence after which an upload is given up."""
+"""Silence after which an upload is aborted, s."""
 _PREFIX = ".upload-"
 
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """A file that was uploaded, in a folder of its own, which ends with the request."""
+    """An uploaded file, in a folder of its own, which is removed with the request."""
 
     file: Path
     sha256: str
 
 
 class Uploads:
-    """Takes uploads, some at a time, into a folder of this service alone; what a killed one left there is removed."""
+    """Receives uploads, some at a time, into a folder of this service alone; leftovers of a killed one are removed."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -43,11 +43,11 @@ class Uploads:
             shutil.rmtree(left)
         self._receptions = asyncio.Semaphore(MOST_RECEIVED)
         self.turn = asyncio.Semaphore(imports_at_once(machine_memory()))
-        """Of reading uploads, as many as the memory allows; a body that arrives slowly holds none."""
+        """Turns for importing uploads, as many as the memory allows; a body that arrives slowly holds none."""
 
     @asynccontextmanager
     async def received(self, request: Request, name: str) -> AsyncIterator[Upload]:
-        """Receive the body of a request under a name; ProblemError where it has stalled, or was cut off."""
+        """Receive the body of a request under a name; raise ProblemError if it stalled or was cut off."""
         async with self._receptions:
             with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=self._folder) as folder:
                 file = Path(folder, name)

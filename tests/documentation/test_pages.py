@@ -108,28 +108,6 @@ def test_the_gallery_shows_every_kind_of_figure_by_commands_that_are_understood(
             understood(command)
 
 
-def test_the_tutorial_runs_and_finds_what_it_says(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
-    cells = re.findall(r"^```\{code-cell\} python3\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    assert len(cells) >= 10
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, Any] = {}
-    for cell in cells:
-        exec(compile(cell, "docs/tutorial.md", "exec"), names)
-    said = capsys.readouterr().out
-    assert "stop[1].restitution: expected 0 <= r <= 1, got 1.2" in said
-    assert "sure of" in said
-    assert "trajectory" in said.splitlines()[-7]
-    assert names["livelier"].impact_velocity.mean() < names["impacts"].impact_velocity.mean()
-    assert names["above"].impacts_per_period.mean("period").values.tolist() == [1.0, 0.0]
-    assert all(abs(r.value - r.exact) <= r.grid_step for r in names["bifurcation_readings"](names["swept"]))
-    found = names["found"].values["trajectory"]
-    truth = {"restitution": 0.7, "damping_ratio": 0.1, "natural_frequency": 1.0, "stop_position": 1000.0}
-    assert all(found[name].low <= value <= found[name].high for name, value in truth.items())
-
-
 def test_every_page_of_the_site_is_in_a_table_of_contents() -> None:
     """Sphinx says so too, after minutes: a room that gets a README is most of what this finds."""
     entries: set[Path] = {ROOT / "docs" / "index.md"}

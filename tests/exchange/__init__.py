@@ -1,1 +1,1 @@
-"""Our FMUs in other tools: what each makes of an export, against the dataset of the scene that it was made of."""
+"""Exchange of our FMUs with other tools: results of each tool compared with the dataset of the exported scene."""

@@ -1,7 +1,7 @@
-"""`make exchange`: every export in every tool that is here, into docs/exchange.md; exit code 1 where one differs.
+"""`make exchange`: every export in every installed tool, into docs/exchange.md; exit code 1 if a result differs.
 
 `python -m exchange machines` makes one of its tables: tools, pairs, integrated, stiff, systems, reference, machines.
-A tool that is not here has no row; the program says so.
+A tool that is not installed has no row; the program reports it.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ from vibroimpact.fmus.packaging.export import export_fmu
 PAGE = ROOT / "docs" / "exchange.md"
 GOAL = 1e-9
 NO_COUPLING = "couples none"
-"""The cell of a tool that runs one FMU alone."""
+"""Cell for a tool that runs only single FMUs."""
 CONSOLE = Console(width=180)
 CONSOLE.soft_wrap = True
 
 
 def main() -> int:
-    """Try all, or the tables that are named, print and write them."""
+    """Try all tables, or the named ones, print and write them."""
     tables = {
         "tools": lambda: _of_tools("tools", list(NAMES), _row_of_tool),
         "pairs": lambda: _of_tools("pairs", list(PAIRS), _row_of_pair),
@@ -75,7 +75,7 @@ Row = Callable[[Tool, str, list[str]], Iterator[Cell]]
 
 
 def _of_tools(table: str, names: list[str], row: Row) -> Iterator[str]:
-    """Write the table of tools or of pairs; yield what was not as it should be."""
+    """Write the table of tools or of pairs; yield the failures."""
     lines = ["| tool | FMI | " + " | ".join(names) + " |", "|---" * (2 + len(names)) + "|"]
     for tool in _here(TOOLS):
         for versions, cells in _cells(tool, table, row):
@@ -87,7 +87,7 @@ def _of_tools(table: str, names: list[str], row: Row) -> Iterator[str]:
 
 
 def _of_integrated() -> Iterator[str]:
-    """Write the table of model exchange; yield what was not as it should be."""
+    """Write the table of model exchange; yield the failures."""
     names = list(_model_exchange.STEPS)
     lines = ["| tool | FMI | tolerance | " + " | ".join(names) + " |", "|---" * (3 + len(names)) + "|"]
     for tool in _here(tool for tool in TOOLS if tool.name in _model_exchange.VERSIONS):
@@ -104,12 +104,12 @@ def _of_integrated() -> Iterator[str]:
 def _cell_of_integrated(tool: Tool, fmi: str, name: str, tolerance: float) -> Cell:
     with tempfile.TemporaryDirectory() as folder:
         it = made(name, fmi, Path(folder)).integrated(_model_exchange.STEPS[name])
-        asked = (tool, it.path, it.outputs, it.step, len(it.rows), Path(folder), tolerance)
-        return _cell(run_integrated, it.rows, *asked, rows=it.quiet)
+        arguments = (tool, it.path, it.outputs, it.step, len(it.rows), Path(folder), tolerance)
+        return _cell(run_integrated, it.rows, *arguments, rows=it.quiet)
 
 
 def _of_stiff() -> Iterator[str]:
-    """Write the table of steps that a stiff chain takes; yield where they are too many."""
+    """Write the table of steps for a stiff chain; yield the tools that take too many."""
     lines = ["| tool | FMI | steps |", "|---|---|---|"]
     for tool in _here(tool for tool in (*TOOLS, CASADI) if tool.name in _stiff.VERSIONS):
         for fmi in _stiff.VERSIONS[tool.name]:
@@ -129,7 +129,7 @@ def _of_stiff() -> Iterator[str]:
 
 
 def _of_systems() -> Iterator[str]:
-    """Write the table of systems; yield what was not as it should be."""
+    """Write the table of systems; yield the failures."""
     lines = ["| tool | FMI | gains | two oscillators with a spring |", "|---|---|---|---|"]
     here = [tool.name for tool in _here(tool for tool in TOOLS if tool.name in _systems.GAINS)]
     for tool, fmi, gains in _systems.PAIRS:
@@ -147,7 +147,7 @@ def _of_systems() -> Iterator[str]:
 
 
 def _of_reference_fmus() -> Iterator[str]:
-    """Write the table of FMUs in our importer; yield what was not as it should be."""
+    """Write the table of Reference-FMUs in our importer; yield the failures."""
     if reason := missing():
         _write("reference", [f"Not tried: {reason}."])
         return
@@ -171,7 +171,7 @@ def _of_reference_fmus() -> Iterator[str]:
 
 
 def _of_machines() -> Iterator[str]:
-    """Write the table of machines that FMUs are made for; yield what was not as it should be."""
+    """Write the table of target machines; yield the failures."""
     lines = ["| made for | FMI | " + " | ".join(NAMES) + " |", "|---" * (2 + len(NAMES)) + "|"]
     for machine in MACHINES:
         if reason := machine.missing():
@@ -191,7 +191,7 @@ def _of_machines() -> Iterator[str]:
 
 
 def _cell_of_machine(machine: Machine, host: Path, name: str, fmi: str, folder: Path) -> Cell:
-    it = made(name, fmi, folder, machine.asked_for)
+    it = made(name, fmi, folder, machine.export_platform)
     try:
         rows = machine.run(host, it.path, it.outputs, it.step, len(it.rows))
     except HostFailedError as error:
@@ -215,7 +215,7 @@ def _write(table: str, lines: list[str]) -> None:
 
 
 def _here(tools: Iterable[Tool]) -> Iterator[Tool]:
-    """Yield the tools that are here; say of the others why they are not tried."""
+    """Yield the installed tools; print why the others are not tried."""
     for tool in tools:
         if reason := tool.missing():
             CONSOLE.print(f"{tool.name} is not tried: {reason}.", markup=False)
@@ -243,14 +243,14 @@ def _row_of_pair(tool: Tool, fmi: str, names: list[str]) -> Iterator[Cell]:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             it = made_pair(name, tool, fmi, Path(folder))
-            asked = (tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, Path(folder))
-            yield _cell(run_coupled, it.rows, *asked)
+            arguments = (tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, Path(folder))
+            yield _cell(run_coupled, it.rows, *arguments)
 
 
 def _cell(
     ask: Callable[..., Answer], expected: Rows, *arguments: object, rows: NDArray[np.bool_] | None = None
 ) -> Cell:
-    """Return the difference of a tool's answer, in some of its rows where they are named, or what is wrong with it."""
+    """Return the error of a tool's answer, in all rows or in the given ones, or the tool's fault in words."""
     try:
         answer = ask(*arguments)
     except ToolFailedError as error:

@@ -1,4 +1,4 @@
-"""What is exchanged: bodies with stops, each a scene, the FMU exported of it, and the dataset of its own run."""
+"""Cases of the exchange: bodies with stops, each as a scene, as an exported FMU, and as the dataset of our own run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import dataset_name
 
 RATE = 512.0
-"""Samples per second: a step has no rounding, neither in binary nor in the nanoseconds that libcosim counts."""
+"""Samples per second; the step has no rounding error, neither in binary nor in libcosim's nanoseconds."""
 
 COUNT = 4000
 
@@ -41,11 +41,11 @@ class Case:
     Attributes
     ----------
     tables : mapping of str to table
-        The scene without its record.
+        Scene without its table `record`.
     rate : float
         Steps per second.
     count : int
-        Steps.
+        Number of steps.
     """
 
     tables: dict[str, Any]
@@ -55,22 +55,22 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Exchanged:
-    """An FMU, and what it does by our own run.
+    """An FMU, and its results in our own run.
 
     Attributes
     ----------
     path : Path
-        The FMU.
+        File of the FMU.
     outputs : tuple of str
-        All its outputs.
+        Names of all its outputs.
     step : float
         Communication step, s.
     rows : ndarray, shape (step, output)
         The outputs after each step.
     smooth : tuple of str
-        The outputs that an integrator gives as well: the continuous ones.
+        Names of the outputs that an integrator computes too: the continuous ones.
     quiet : ndarray of bool, shape (step,)
-        Steps with no event of a contact nearer than two steps.
+        Steps without a contact event within two steps.
     """
 
     path: Path
@@ -81,7 +81,7 @@ class Exchanged:
     quiet: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
 
     def read_by(self, tool: Tool, fmi: str) -> Exchanged:
-        """Return what a tool is compared with: all outputs that it can read."""
+        """Return the reference for a tool: all outputs that it can read."""
         if fmi not in tool.without_integers:
             return self
         kinds = described(str(self.path))
@@ -89,7 +89,7 @@ class Exchanged:
         return replace(self, outputs=kept, rows=self.rows[:, [self.outputs.index(name) for name in kept]])
 
     def integrated(self, count: int) -> Exchanged:
-        """Return what an integrator is compared with: the smooth outputs of the first steps."""
+        """Return the reference for an integrator: the smooth outputs of the first steps."""
         columns = [self.outputs.index(name) for name in self.smooth]
         return replace(self, outputs=self.smooth, rows=self.rows[:count, columns], quiet=self.quiet[:count])
 
@@ -114,7 +114,7 @@ BEAM_STOP = {"position": 0.004, "law": "restitution", "restitution": 0.6}
 CHATTER = {"position": 0.0, "law": "restitution", "restitution": 0.7}
 SHAKEN = "base_acceleration"
 MILLISECONDS = 1000.0
-"""Samples per second whose step has a rounding in binary."""
+"""Samples per second; the step has a rounding error in binary."""
 LONG = 10_000
 
 CASES = {
@@ -172,7 +172,7 @@ NAMES = (*CASES, IMPACT_STOP, REPLAY)
 
 
 def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> Exchanged:
-    """Return the FMU of a case, and what its outputs are after each step by our own run."""
+    """Return the FMU of a case, with its outputs after each step of our own run."""
     path = folder / "exported.fmu"
     if name == REPLAY:
         return _replay(fmi, path, platform)
@@ -223,7 +223,7 @@ class OurRun:
 
 @cache
 def our_run(name: str) -> OurRun:
-    """Return our own run of a case, which is made once."""
+    """Return our own run of a case; the result is cached."""
     case = CASES[name]
     period = 2.0 * np.pi / case.tables["forcing"]["angular_frequency"]
     record = {"recorded_periods": int(np.ceil((case.count + 1) / case.rate / period))}
@@ -245,7 +245,7 @@ def our_run(name: str) -> OurRun:
 
 
 def _series_of(name: str) -> str:
-    """Return what a time series calls an output of a body; empty where it has none of it."""
+    """Return the name in a time series for an output of a body; empty if a time series lacks it."""
     if match := re.fullmatch(r"contact\[(\d+)\]\.(displacement|velocity|force)", name):
         return f"contact_{match[2]}[{match[1]}]"
     plain = r"(displacement|velocity|acceleration)(\[\d+\])?|energy\..*|modal_(displacement|velocity)\[\d+\]"
@@ -253,7 +253,7 @@ def _series_of(name: str) -> str:
 
 
 def _by_importer(scene: Scene, names: list[str], case: Case, folder: Path) -> dict[str, Rows]:
-    """Return the outputs that no time series has, counts and impulses of contacts, by a run of our importer."""
+    """Return the outputs that no time series has (counts and impulses of contacts), from a run of our importer."""
     parameters = {**exported_floats(scene), **integer_parameters(scene)}
     tables = {
         "component": {"body": {"fmu": scene.body.FMU, "parameters": parameters}},
@@ -281,7 +281,7 @@ def _quiet(run: Dataset, case: Case) -> NDArray[np.bool_]:
 
 
 def _replay(fmi: str, path: Path, platform: str | None) -> Exchanged:
-    """Return an FMU of noise at twice the rate with a gap, and of a slow channel on instants of its own."""
+    """Return an FMU of noise at twice the rate with a gap, and of a slow channel with instants of its own."""
     random = np.random.default_rng(13)
     times = np.arange(2 * COUNT + 2) / (2.0 * RATE)
     values, instants = random.normal(size=len(times)), (np.cumsum(random.integers(25, 150, 60)) + 0.5) / RATE
@@ -314,16 +314,16 @@ def _replay(fmi: str, path: Path, platform: str | None) -> Exchanged:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two oscillators with stops that are coupled, by connections that carry what is known at the start of a step.
+    """Two coupled oscillators with stops; their connections carry the values known at the start of a step.
 
     Attributes
     ----------
     parameters : mapping of str to mapping of str to number
-        Start values of each.
+        Start values of each component.
     connections : sequence of (str, str)
-        From an output to an input.
+        Pairs of an output and an input.
     units : str
-        What a connection between different units is multiplied by.
+        Factor of a connection between different units.
     """
 
     parameters: dict[str, dict[str, Any]]
@@ -342,7 +342,7 @@ LOWER = {
     "contact[2].stiffness": 2e3,
     "contact[2].damping": 1.0,
 }
-# the force begins at 0, since FMPy gives inputs 0 in the first step
+# the force begins at 0, since FMPy gives inputs the value 0 in the first step
 FORCED = {"forcing.amplitude": 3.0, "forcing.angular_frequency": 1.7, "forcing.phase": -np.pi / 2}
 PAIRS = {
     "one rides on the other": Pair(
@@ -381,7 +381,7 @@ PAIRS = {
 
 @dataclass(frozen=True, slots=True)
 class Coupled:
-    """Two FMUs that a tool couples, and what they do by our own run.
+    """Two FMUs that a tool couples, and their results in our own run.
 
     Attributes
     ----------
@@ -399,8 +399,8 @@ class Coupled:
 
 
 def made_pair(name: str, tool: Tool, fmi: str, folder: Path) -> Coupled:
-    """Return the FMUs of a pair, and the outputs that a tool reads by our own importer's Jacobi exchange."""
-    still = {"displacement_start": 0.0}  # else an export that nothing moves starts displaced
+    """Return the FMUs of a pair, and the outputs readable by a tool, by our own importer's Jacobi exchange."""
+    still = {"displacement_start": 0.0}  # without a start, an export that nothing moves starts displaced
     fmus = {
         one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=still | parameters)
         for one, parameters in PAIRS[name].parameters.items()
@@ -440,8 +440,8 @@ def after_exchange(rows: Rows, outputs: Sequence[str], pair: Pair) -> Rows:
     """Return the rows of a tool that exchanges values before it writes a row.
 
     A force on a free mass changes its acceleration at once, by the change of the force over the mass. No other output
-    of these bodies follows an input at once: the absolute acceleration does not depend on that of the base, and no
-    body is held by a stop.
+    of these bodies follows an input at once. The absolute acceleration does not depend on the base's acceleration, and
+    no body is held by a stop.
     """
     rows = rows.copy()
     for source, sink in pair.connections:
@@ -453,6 +453,6 @@ def after_exchange(rows: Rows, outputs: Sequence[str], pair: Pair) -> Rows:
 
 
 def difference(rows: Rows, expected: Rows) -> float:
-    """Return the largest difference, as a part of the largest value of the same output, and of 1 where that is 0."""
+    """Return the largest difference, relative to the largest value of the same output, or absolute where that is 0."""
     largest = np.abs(expected).max(axis=0)
     return float(np.max(np.abs(rows - expected).max(axis=0) / np.where(largest > 0.0, largest, 1.0)))

@@ -1,4 +1,4 @@
-"""Drives one tool, in its own Python, with an FMU, a pair or a system: `python -m exchange._drive REQUEST`."""
+"""Driver of one tool, in its own Python, with an FMU, a pair or a system: `python -m exchange._drive REQUEST`."""
 
 from __future__ import annotations
 

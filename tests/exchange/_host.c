@@ -1,6 +1,6 @@
 /*
- * Loads the library of a co-simulation FMU and prints what its outputs are after each step: for machines that have no
- * other tool, and for those that are pretended (wine, qemu-user).
+ * Loads the library of a co-simulation FMU and prints its outputs after each step. It serves machines without any other
+ * tool, and emulated machines (wine, qemu-user).
  *
  *     host 2|3 LIBRARY TOKEN RESOURCES STEP COUNT OUTPUT...
  *

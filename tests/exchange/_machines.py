@@ -1,4 +1,4 @@
-"""The libraries for other machines, run by a program that is compiled for each: here, or by wine and qemu-user."""
+"""Libraries for other machines, run by a program compiled for each: directly, or by wine and qemu-user."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ from vibroimpact.fmus.packaging.platform_names import TARGETS, Platform, this_pl
 
 SOURCE = Path(__file__).with_name("_host.c")
 LIMIT = 300.0
-"""How long a run may take, s: the first of wine makes a folder of its own."""
+"""Time limit for a run, s: the first run of wine creates its folder."""
 
 LIBRARIES = "QEMU_LD_PREFIX"
-"""The variable of qemu-user that says where a machine's C library is; Debian's packages of it lie below /usr."""
+"""Variable of qemu-user with the place of a machine's C library; Debian installs them below /usr."""
 
 
 class HostFailedError(Exception):
-    """The program gave no values; the text has its last words."""
+    """The program printed no values; the text has its last output."""
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A machine that FMUs are made for, and what runs its programs here.
+    """A target machine of FMUs, and the emulator of its programs.
 
     Attributes
     ----------
     platform : Platform
     runner : str
-        Program that pretends to be it; empty for this machine's own kind.
+        Emulator of the machine; empty if this machine can run its programs.
     """
 
     platform: Platform
     runner: str = ""
 
     def missing(self) -> str:
-        """Return why its libraries cannot be run here, empty where they can."""
+        """Return the reason why its libraries cannot be run here, empty if they can."""
         if not self.runner:
             return "" if self.platform == this_platform() else f"this is no {self.platform.name}"
         if shutil.which(self.runner) is None:
@@ -63,16 +63,16 @@ class Machine:
         return ""
 
     @property
-    def asked_for(self) -> str | None:
-        """The platform to export for; None, the library that was built here, where zig is not installed."""
+    def export_platform(self) -> str | None:
+        """Platform of the export; None, for the library built on this machine, if zig is not installed."""
         return self.platform.name if self.runner or importlib.util.find_spec("ziglang") else None
 
     def shown(self) -> str:
-        """Return its name, and by what it is run."""
+        """Return its name with its emulator."""
         if not self.runner:
             return self.platform.name
-        said = subprocess.run([self.runner, "--version"], capture_output=True, text=True).stdout
-        version = re.search(r"\d+\.[\d.]*\d", said)
+        text = subprocess.run([self.runner, "--version"], capture_output=True, text=True).stdout
+        version = re.search(r"\d+\.[\d.]*\d", text)
         return f"{self.platform.name} ({self.runner} {version[0] if version else ''})"
 
     def _libraries(self) -> Path:
@@ -110,7 +110,7 @@ class Machine:
         return np.array([[float(number) for number in line.split()] for line in done.stdout.splitlines()])
 
     def end(self, host: Path) -> None:
-        """End what the runner leaves behind: wine's server of these runs, which keeps their folder in use."""
+        """End the processes that the emulator leaves behind: wine's server, which keeps the folder in use."""
         if self.runner and self.platform.system == "windows" and (server := shutil.which("wineserver")):
             subprocess.run([server, "-k"], env=self._environment(host), timeout=LIMIT)
 
@@ -120,8 +120,8 @@ class Machine:
         return os.environ | ({LIBRARIES: str(self._libraries())} if self.runner else {})
 
     def _places(self, fmu: UnpackedFmu) -> tuple[str, str, str]:
-        """Return library, token and resources, as the program takes them."""
-        # wine shows this machine's files as those of a drive
+        """Return library, token and resources in the form that the program takes."""
+        # wine shows this machine's files as files of a drive
         drive = "Z:" if self.runner and self.platform.system == "windows" else ""
         name = f"{fmu.identifiers[0]}{self.platform.suffix}"
         library = fmu.folder / "binaries" / self.platform.folder(fmu.fmi_version) / name

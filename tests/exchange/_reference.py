@@ -1,4 +1,4 @@
-"""The FMI project's Reference-FMUs in our importer: each beside the result that its own archive brings along."""
+"""The FMI project's Reference-FMUs in our importer, each compared with the result in its own archive."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ VERSIONS = ("2.0", "3.0")
 EXAMPLE = "bouncing_ball.toml"
 BALL = "BouncingBall"
 LONGEST = 1e4
-"""Longest run that is made, s: an experiment beyond it is cut to one step."""
+"""Longest run, s: a longer experiment is cut to one step."""
 
 Fmus = dict[str, dict[str, Path]]
 Table = tuple[list[str], Rows]
 
 
 def missing() -> str:
-    """Return why they cannot be tried here, empty where they can."""
+    """Return the reason why the FMUs cannot be tried here, empty if they can."""
     folder = os.environ.get(VARIABLE)
     if not folder:
         return f"no folder of them is named by {VARIABLE}"
@@ -39,7 +39,7 @@ def missing() -> str:
 
 
 def found() -> Fmus:
-    """Return the FMUs that are in the folder, or below it, by name and version of FMI."""
+    """Return the FMUs in the folder, or below it, by name and version of FMI."""
     fmus: Fmus = {}
     for path in sorted(Path(os.environ[VARIABLE]).rglob("*.fmu")):
         version = _description(path).fmiVersion[:3]
@@ -49,14 +49,14 @@ def found() -> Fmus:
 
 
 def imported(path: Path, folder: Path) -> float | str:
-    """Return the largest difference to the result in the archive, as a part of its largest value, or what was said.
+    """Return the largest difference from the archive's result, relative to its largest value, or the error message.
 
     Parameters
     ----------
     path : Path
-        The FMU.
+        File of the FMU.
     folder : Path
-        Where files may be written.
+        Folder for temporary files.
     """
     description = _description(path)
     if description.coSimulation is None:
@@ -67,22 +67,22 @@ def imported(path: Path, folder: Path) -> float | str:
     try:
         rows, events = _run(path, compared or scalars[:1], expected[:, 0], folder)
     except VibroimpactError as error:
-        # the FMU's own words come last
+        # the FMU's own message comes last
         return f"refused: {str(error).splitlines()[0].rpartition(': ')[2]}"
     if not compared:
         return "runs; nothing to compare"
-    wanted = expected[:, [0, *(names.index(name) for name in compared)]]
-    # an FMU may ask for the end before its experiment's; of a sample at an event both sides are right
+    chosen = expected[:, [0, *(names.index(name) for name in compared)]]
+    # an FMU may ask to end before its experiment does; for a sample at an event both sides are right
     ours = {round(time, 9): row for time, *row in rows if not np.any(np.abs(events - time) <= 1e-9)}
-    pairs = [(ours[round(time, 9)], row) for time, *row in wanted if round(time, 9) in ours]
-    if len(pairs) < len(wanted) / 2:
-        return f"{len(pairs)} of {len(wanted)} rows"
+    pairs = [(ours[round(time, 9)], row) for time, *row in chosen if round(time, 9) in ours]
+    if len(pairs) < len(chosen) / 2:
+        return f"{len(pairs)} of {len(chosen)} rows"
     got, there = np.array(pairs).transpose(1, 0, 2)
     return float(np.max(np.abs(got - there) / np.maximum(np.abs(there).max(axis=0), 1e-300)))
 
 
 def bounces(path: Path, folder: Path) -> list[float]:
-    """Return when the ball bounces, s, by the shipped example that couples this FMU, at its own restitution of 0.7."""
+    """Return the instants of the ball's bounces, s, by the shipped example with this FMU, at a restitution of 0.7."""
     shutil.copyfile(path, folder / f"{BALL}.fmu")
     shutil.copyfile(EXAMPLES / EXAMPLE, folder / EXAMPLE)
     run_scene(Scene.from_file(folder / EXAMPLE), folder / "bounces.nc")
@@ -98,12 +98,12 @@ def _scalars(description: ModelDescription) -> list[str]:
     def is_number(variable: ScalarVariable) -> bool:
         return variable.type not in ("String", "Binary", "Clock") and not variable.dimensions
 
-    wanted = [v for v in description.modelVariables if v.causality != "independent" and is_number(v)]
-    return [v.name for v in sorted(wanted, key=lambda v: v.causality not in ("output", "local"))]
+    chosen = [v for v in description.modelVariables if v.causality != "independent" and is_number(v)]
+    return [v.name for v in sorted(chosen, key=lambda v: v.causality not in ("output", "local"))]
 
 
 def _result(path: Path) -> Table:
-    """Return the names and columns of the result in an archive; of what is no number, 0."""
+    """Return the names and columns of the result in an archive, with 0 in place of texts."""
 
     def number(text: str) -> float:
         try:
@@ -118,8 +118,8 @@ def _result(path: Path) -> Table:
 
 
 def _run(path: Path, names: list[str], time: Rows, folder: Path) -> tuple[Rows, Rows]:
-    """Return time and variables of our run of the experiment whose result has this time, and the instants of events."""
-    # differences of times that were written with all their digits are rounded in the last ones
+    """Return time and variables of our run of the experiment with these instants, and the instants of events."""
+    # differences of times that were written with all digits have rounding errors in the last digits
     end = float(time[-1])
     step = end / round(end / float(np.median(np.diff(time))))
     scene = Scene.from_dict(

@@ -1,4 +1,4 @@
-"""One FMU in each tool: what its outputs are after each step. Runs in the Python that has the tool."""
+"""One FMU in each tool: its outputs after each step. Runs in the Python with the tool."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ Request = dict[str, Any]
 Rows = list[list[float]]
 
 
-def fmpy(asked: Request) -> Rows:
-    """Run it by FMPy."""
+def fmpy(request: Request) -> Rows:
+    """Run the FMU by FMPy."""
     from fmpy import simulate_fmu
 
-    step, count = asked["step"], asked["count"]
+    step, count = request["step"], request["count"]
     done = simulate_fmu(
-        asked["fmu"],
-        output=asked["names"],
+        request["fmu"],
+        output=request["names"],
         step_size=step,
         output_interval=step,
         stop_time=step * count,
     )
-    return [[float(row[name]) for name in asked["names"]] for row in done[1:]]
+    return [[float(row[name]) for name in request["names"]] for row in done[1:]]
 
 
-def libcosim(asked: Request) -> Rows:
-    """Run it by libcosim, which knows variables by reference."""
+def libcosim(request: Request) -> Rows:
+    """Run the FMU by libcosim, which knows variables by reference."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    execution = CosimExecution.from_step_size(round(asked["step"] * 1e9))
-    slave = CosimLocalSlave(asked["fmu"], "body")
+    execution = CosimExecution.from_step_size(round(request["step"] * 1e9))
+    slave = CosimLocalSlave(request["fmu"], "body")
     index = execution.add_local_slave(slave)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
-    read = libcosim_reader(observer, [(index, asked["fmu"], name) for name in asked["names"]])
+    read = libcosim_reader(observer, [(index, request["fmu"], name) for name in request["names"]])
     rows = []
-    for _ in range(asked["count"]):
+    for _ in range(request["count"]):
         execution.step()
         rows.append(read())
     return rows
@@ -73,7 +73,7 @@ KINDS = {"Float64": "real", "Real": "real", "Int64": "integer", "Integer": "inte
 
 
 def described(fmu: str) -> dict[str, tuple[int, str]]:
-    """Return reference and kind of each of an FMU's variables: real, integer or boolean; others are left out."""
+    """Return the reference and the kind (real, integer or boolean) of an FMU's variables; others are left out."""
     from fmpy import read_model_description
 
     variables = read_model_description(fmu).modelVariables
@@ -85,18 +85,18 @@ def value_references(fmu: str) -> dict[str, int]:
     return {name: reference for name, (reference, _) in described(fmu).items()}
 
 
-def ecos(asked: Request) -> Rows:
-    """Run it by Ecos."""
+def ecos(request: Request) -> Rows:
+    """Run the FMU by Ecos."""
     load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
 
     rows = []
     with EcosSimulationStructure() as structure:
-        structure.add_model("body", asked["fmu"])
-        with EcosSimulation(structure=structure, step_size=asked["step"]) as simulation:
+        structure.add_model("body", request["fmu"])
+        with EcosSimulation(structure=structure, step_size=request["step"]) as simulation:
             simulation.init()
-            read = ecos_reader(simulation, [("body", asked["fmu"], name) for name in asked["names"]])
-            for _ in range(asked["count"]):
+            read = ecos_reader(simulation, [("body", request["fmu"], name) for name in request["names"]])
+            for _ in range(request["count"]):
                 simulation.step()
                 rows.append(read())
     return rows
@@ -110,68 +110,68 @@ def ecos_reader(simulation: Any, outputs: Sequence[tuple[str, str, str]]) -> Cal
         "boolean": simulation.get_bool,
     }
     described_by = {fmu: described(fmu) for fmu in {fmu for _, fmu, _ in outputs}}
-    wanted = [(readers[described_by[fmu][name][1]], f"{one}::{name}") for one, fmu, name in outputs]
-    return lambda: [float(read(name)) for read, name in wanted]
+    named = [(readers[described_by[fmu][name][1]], f"{one}::{name}") for one, fmu, name in outputs]
+    return lambda: [float(read(name)) for read, name in named]
 
 
 def load_tbb() -> None:
-    """Load the library of the package tbb, which that of Ecos needs and does not find by itself."""
+    """Load the library of the package tbb; the library of Ecos needs it and does not find it by itself."""
     for library in Path(sys.prefix, "lib").glob("libtbb.so.*"):
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
         break
 
 
-def pyfmi(asked: Request) -> Rows:
-    """Run it by PyFMI."""
+def pyfmi(request: Request) -> Rows:
+    """Run the FMU by PyFMI."""
     from pyfmi import load_fmu
 
-    step, count = asked["step"], asked["count"]
-    model = load_fmu(asked["fmu"], kind="cs")
+    step, count = request["step"], request["count"]
+    model = load_fmu(request["fmu"], kind="cs")
     model.setup_experiment(start_time=0.0, stop_time=step * count)
     model.initialize()
     rows = []
     for index in range(count):
         if status := model.do_step(index * step, step):
             raise RuntimeError(f"PyFMI: do_step gave {status}")
-        rows.append([float(model.get(name)[0]) for name in asked["names"]])
+        rows.append([float(model.get(name)[0]) for name in request["names"]])
     return rows
 
 
-def fmusim(asked: Request) -> Rows:
-    """Run it by fmusim of the Reference-FMUs."""
-    step = asked["step"]
-    options = ["--interface-type", "cs", "--stop-time", repr(step * asked["count"]), "--output-file", "f.csv"]
+def fmusim(request: Request) -> Rows:
+    """Run the FMU by fmusim of the Reference-FMUs."""
+    step, count = request["step"], request["count"]
+    options = ["--interface-type", "cs", "--stop-time", repr(step * count), "--output-file", "f.csv"]
     options += ["--output-interval", repr(step), "--logging-on"]
-    for name in asked["names"]:
+    for name in request["names"]:
         options += ["--output-variable", name]
-    run_program(asked, *options, asked["fmu"])
-    return list(columns(Path("f.csv"), asked["names"]))[1:]
+    run_program(request, *options, request["fmu"])
+    return list(columns(Path("f.csv"), request["names"]))[1:]
 
 
-def omsimulator(asked: Request) -> Rows:
-    """Run it by OMSimulator."""
-    step = asked["step"]
-    options = ["--mode=cs", f"--stopTime={step * asked['count']!r}", f"--stepSize={step!r}"]
-    run_program(asked, *options, "--resultFile=r.csv", asked["fmu"])
-    return list(columns(Path("r.csv"), asked["names"]))[1:]
+def omsimulator(request: Request) -> Rows:
+    """Run the FMU by OMSimulator."""
+    step = request["step"]
+    options = ["--mode=cs", f"--stopTime={step * request['count']!r}", f"--stepSize={step!r}"]
+    run_program(request, *options, "--resultFile=r.csv", request["fmu"])
+    return list(columns(Path("r.csv"), request["names"]))[1:]
 
 
-def compliance_checker(asked: Request) -> Rows:
-    """Run it by the FMU Compliance Checker, and hand on its verdict on the description."""
-    step = asked["step"]
-    options = ["-k", "cs", "-h", repr(step), "-s", repr(step * asked["count"]), "-o", "c.csv", "-n", "0"]
-    run_program(asked, *options, asked["fmu"])
-    return list(columns(Path("c.csv"), asked["names"]))[1:]
+def compliance_checker(request: Request) -> Rows:
+    """Run the FMU by the FMU Compliance Checker, and pass on its verdict on the description."""
+    step = request["step"]
+    options = ["-k", "cs", "-h", repr(step), "-s", repr(step * request["count"]), "-o", "c.csv", "-n", "0"]
+    run_program(request, *options, request["fmu"])
+    return list(columns(Path("c.csv"), request["names"]))[1:]
 
 
-def run_program(asked: Request, *arguments: str) -> None:
-    """Run the tool's program, whose words go where ours go; end where it fails."""
-    if code := subprocess.run([asked["program"], *arguments]).returncode:
+def run_program(request: Request, *arguments: str) -> None:
+    """Run the tool's program with this process's output streams; exit if it fails."""
+    if code := subprocess.run([request["program"], *arguments]).returncode:
         raise SystemExit(f"exit code {code}")
 
 
 def columns(path: Path, names: Sequence[str]) -> Iterator[list[float]]:
-    """Return the columns of a CSV file by name, one row for each time: the last that was written at it."""
+    """Yield the rows of named columns of a CSV file, one for each time: the last row at that time."""
     with path.open(newline="") as file:
         header, *lines = csv.reader(file, skipinitialspace=True)
         places = [header.index(name) for name in names]

@@ -1,8 +1,8 @@
-"""A chain of 12 masses with stiff dashpots: how many steps an integrator takes says whether it has the Jacobian.
+"""A chain of 12 masses with stiff dashpots: the number of an integrator's steps shows whether it has the Jacobian.
 
-PyFMI and CasADi make it by setting states one by one. PyFMI does not look at a refusal: its Jacobian is zero then, and
-its steps are those of a method that is not for stiff problems, 5,669,129 for 3,238 in a chain of five masses.
-Runs in the Python that has the tool.
+PyFMI and CasADi compute the Jacobian by setting states one by one. PyFMI ignores a refusal, and its Jacobian is zero
+then. Its steps become those of a method for non-stiff problems: 5,669,129 in place of 3,238 in a chain of five masses.
+Runs in the Python with the tool.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MASSES = 12
 STOP_TIME = 5.0
 TOLERANCE = 1e-6
 MOST_STEPS = 5000
-"""Steps with the Jacobian, and some more; without it there are a hundred times as many."""
+"""Largest number of steps with the Jacobian, with a margin; without the Jacobian it is a hundred times as large."""
 STARTS = {
     **{f"mass[{k}]": 1.0 + 0.1 * k for k in range(1, MASSES + 1)},
     **{f"stiffness[{k}]": 1000.0 for k in range(1, MASSES + 1)},
@@ -28,10 +28,10 @@ STARTS = {
     **{f"forcing.amplitude[{k}]": 100.0 for k in range(1, MASSES + 1)},
 }
 VERSIONS = {"FMPy": ("2.0", "3.0"), "CasADi": ("2.0", "3.0"), "PyFMI": ("2.0", "3.0")}
-"""Tools that say how many steps they take."""
+"""Tools that report the number of their steps."""
 
 
-def fmpy(asked: Request) -> Rows:
+def fmpy(request: Request) -> Rows:
     """Count the steps of FMPy's CVode."""
     import ctypes
 
@@ -48,12 +48,12 @@ def fmpy(asked: Request) -> Rows:
     usual, sundials.CVodeSolver = sundials.CVodeSolver, Kept
     try:
         simulate_fmu(
-            asked["fmu"],
+            request["fmu"],
             fmi_type="ModelExchange",
             solver="CVode",
-            relative_tolerance=asked["tolerance"],
-            stop_time=asked["stop_time"],
-            output_interval=asked["stop_time"],
+            relative_tolerance=request["tolerance"],
+            stop_time=request["stop_time"],
+            output_interval=request["stop_time"],
         )
     finally:
         sundials.CVodeSolver = usual
@@ -62,33 +62,33 @@ def fmpy(asked: Request) -> Rows:
     return [[float(steps.value)]]
 
 
-def casadi(asked: Request) -> Rows:
+def casadi(request: Request) -> Rows:
     """Count the steps of CasADi's CVodes."""
     import casadi as ca
 
     folder = Path("unpacked")
-    with zipfile.ZipFile(asked["fmu"]) as archive:
+    with zipfile.ZipFile(request["fmu"]) as archive:
         archive.extractall(folder)
     dae = ca.DaeBuilder("chain", str(folder.absolute()))
     dynamics = dae.create("dynamics", ["t", "x"], ["ode"])
     t, x = ca.MX.sym("t"), ca.MX.sym("x", len(dae.x()))
     problem = {"t": t, "x": x, "ode": dynamics(t, x)}
-    options = {"reltol": asked["tolerance"], "abstol": asked["tolerance"] * 1e-2, "max_num_steps": 10**7}
-    flight = ca.integrator("flight", "cvodes", problem, 0.0, asked["stop_time"], options)
+    options = {"reltol": request["tolerance"], "abstol": request["tolerance"] * 1e-2, "max_num_steps": 10**7}
+    flight = ca.integrator("flight", "cvodes", problem, 0.0, request["stop_time"], options)
     flight(x0=dae.start(dae.x()))
     return [[float(flight.stats()["nsteps"])]]
 
 
-def pyfmi(asked: Request) -> Rows:
+def pyfmi(request: Request) -> Rows:
     """Count the steps of PyFMI's CVode."""
     from pyfmi import load_fmu
 
-    model = load_fmu(asked["fmu"], kind="me")
+    model = load_fmu(request["fmu"], kind="me")
     options = model.simulate_options()
     options["ncp"] = 1
     options["result_handling"] = "binary"
-    options["CVode_options"] |= {"rtol": asked["tolerance"], "verbosity": 50}
-    found = model.simulate(final_time=asked["stop_time"], options=options)
+    options["CVode_options"] |= {"rtol": request["tolerance"], "verbosity": 50}
+    found = model.simulate(final_time=request["stop_time"], options=options)
     return [[float(found.solver.statistics["nsteps"])]]
 
 

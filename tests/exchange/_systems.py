@@ -1,4 +1,4 @@
-"""The system that is exchanged: two oscillators with a spring between them, as the example has them."""
+"""The exchanged system: two oscillators with a spring between them, as in the example."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ COUNT = 1000
 #: All outputs of a body without stops.
 OUTPUTS = ("displacement", "velocity", "acceleration", "energy.kinetic", "energy.potential")
 NAMES = tuple(f"{body}.{output}" for body in "ab" for output in OUTPUTS)
-#: Stiffness of each mass' own springs, and of the spring between them, N/m; the masses are 1 kg.
+#: Stiffness of each mass's own springs, and of the spring between the masses, N/m; the masses are 1 kg.
 STIFFNESS, BETWEEN = 1.1, 0.1
-#: The tools exchange values as `jacobi` does.
+#: Changes to the scene: our run exchanges values as the tools do (`jacobi`).
 CHANGES = (
     "execution.exchange=jacobi",
     f"execution.macro_step={STEP}",
@@ -30,7 +30,7 @@ CHANGES = (
     f"record.recorded_time={COUNT * STEP}",
     f"record.variables={json.dumps(NAMES)}",
 )
-#: OMSimulator leaves transformations of connections out; through a component the others answer one step late.
+#: OMSimulator ignores transformations of connections; through a component, the other tools answer one step late.
 GAINS = {
     "libcosim": ("component", "transformation"),
     "Ecos": ("component", "transformation"),
@@ -47,7 +47,7 @@ PAIRS = [
 
 
 def made(folder: Path, tool: Tool, fmi: str, gains: str) -> tuple[Path, Rows]:
-    """Return the archive, and the outputs after each step: by our own run, or with springs one step late."""
+    """Return the archive, and the outputs after each step of our own run, or of a run with springs one step late."""
     scene = load_scene(EXAMPLES / "two_oscillators.toml", CHANGES)
     samples = vi.run(scene, progress=False).vibroimpact.samples()
     rows = np.column_stack([samples[dataset_name(name)].values for name in NAMES])[1:]
@@ -58,7 +58,7 @@ def made(folder: Path, tool: Tool, fmi: str, gains: str) -> tuple[Path, Rows]:
 
 
 def after_exchange(rows: Rows) -> Rows:
-    """Return the rows of a tool that exchanges forces before it writes a row: accelerations have the new forces."""
+    """Return the rows of a tool that exchanges forces before it writes a row: accelerations follow the new forces."""
     rows, starts = rows.copy(), {"a": 1.0, "b": 0.0}
     for body, other in ("ab", "ba"):
         moved = np.diff(rows[:, NAMES.index(f"{other}.displacement")], prepend=starts[other])
@@ -72,9 +72,9 @@ def is_late(tool: Tool, gains: str) -> bool:
 
 
 def one_step_late(*, exchanges_first: bool) -> Rows:
-    """Return the outputs where each spring answers one step late: from the exact flow of either mass.
+    """Return the outputs with springs that answer one step late, from the exact flow of each mass.
 
-    Between two exchanges each mass has the force that the other's displacement called for a step before the last.
+    Between two exchanges each mass feels the force for the other mass's displacement one step before the last exchange.
     """
     rate = np.sqrt(STIFFNESS)
     c, s = np.cos(rate * STEP), np.sin(rate * STEP) / rate

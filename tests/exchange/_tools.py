@@ -1,4 +1,4 @@
-"""The tools: whether each is there, which version, and what it makes of FMUs, in a process of its own."""
+"""The tools: presence, version, and results with FMUs, computed in a separate process."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from xml.etree import ElementTree
 from support.places import ROOT
 
 LIMIT = 120.0
-"""How long a tool may take for a run, s."""
+"""Time limit for a run of a tool, s."""
 
 WARNING = re.compile(r"\bwarn(ing)?\b(?!\(s\))|\berror\b(?!\(s\))", re.IGNORECASE)
-"""A line in which a tool, or an FMU through it, complains: not one that counts complaints, `0 Warning(s)`."""
+"""A line with a complaint of a tool, or of an FMU through it; counts of complaints, `0 Warning(s)`, do not match."""
 
 COUNTS = re.compile(r"\b0 (warnings|errors)\b|warning\(s\) and error\(s\)", re.IGNORECASE)
 OF_ITSELF = re.compile(r"FMI3 support is experimental")
-"""What PyFMI says of itself, whatever the FMU."""
+"""PyFMI's message about itself, printed for any FMU."""
 
 Rows = list[list[float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool that runs FMUs, driven by a function of `_single`, and of `_couple` where it couples them.
+    """A tool that runs FMUs, driven by a function of `_single`, and of `_couple` if it couples them.
 
     Attributes
     ----------
     package, program : str
-        What must be installed, or be found on PATH. The variable `VIBROIMPACT_` + its name in capitals names a Python
-        that has the package, or the program.
+        Package to install, or program to find on PATH. The variable `VIBROIMPACT_` + its name in capitals names a
+        Python with the package, or the program.
     versions : tuple of str
-        The versions of FMI that it speaks.
+        Versions of FMI that the tool supports.
     couples : tuple of str
-        The versions of FMI of which it couples FMUs.
+        Versions of FMI whose FMUs the tool can couple.
     without_integers : tuple of str
-        The versions of FMI whose integers it cannot read: Ecos has half of the room for those of FMI 3.0, and ends.
+        Versions of FMI whose integers the tool cannot read: Ecos reserves too little memory for FMI 3.0's, and ends.
     exchanges_first : bool
-        Whether it exchanges the values of a step before it writes the row of the step's end.
+        Whether the tool exchanges the values of a step before it writes the row of the step's end.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Tool:
     exchanges_first: bool = False
 
     def missing(self) -> str:
-        """Return why it cannot be tried here, empty where it can."""
+        """Return the reason why the tool cannot be tried here, empty if it can."""
         named = os.environ.get(self.variable)
         if named and shutil.which(named) is None:
             return f"{self.variable} names {named}, which is no program"
@@ -71,20 +71,20 @@ class Tool:
 
     @property
     def variable(self) -> str:
-        """Name of the variable that says where it is."""
+        """Name of the variable that says where the tool is."""
         return "VIBROIMPACT_" + (self.package or self.program).partition(".")[0].upper()
 
     def path(self) -> str | None:
-        """Return where its program is."""
+        """Return the path of the tool's program."""
         return shutil.which(os.environ.get(self.variable) or self.program)
 
     @property
     def python(self) -> str:
-        """The Python that its driver runs in."""
+        """The Python that runs the tool's driver."""
         return (os.environ.get(self.variable) if self.package else None) or sys.executable
 
     def shown(self) -> str:
-        """Return its name with its version."""
+        """Return the tool's name with its version."""
         version = (
             f"{self.package} {self._version_of_package()}" if self.package else self._version_of_program()
         )
@@ -96,20 +96,20 @@ class Tool:
             "there = importlib.util.find_spec(sys.argv[1])\n"
             "print(m.version(sys.argv[1]) if there else '')"
         )
-        return _said_by([self.python, "-c", code, self.package]).strip()
+        return _output_of([self.python, "-c", code, self.package]).strip()
 
     def _version_of_program(self) -> str:
-        found = re.search(r"v?(\d+\.\d[\w.]*)", _said_by([str(self.path()), "--version"]))
+        found = re.search(r"v?(\d+\.\d[\w.]*)", _output_of([str(self.path()), "--version"]))
         return found[1] if found else ""
 
 
-def _said_by(command: Sequence[str]) -> str:
+def _output_of(command: Sequence[str]) -> str:
     return subprocess.run(command, capture_output=True, text=True, timeout=LIMIT).stdout
 
 
 TOOLS = (
     Tool("FMPy", ("2.0", "3.0"), package="fmpy", couples=("2.0",)),
-    # libcosim 0.11 speaks FMI 3.0 not at all, and ends with a segmentation fault when it is given such an FMU
+    # libcosim 0.11 does not support FMI 3.0, and crashes with a segmentation fault on such an FMU
     Tool("libcosim", ("2.0",), package="libcosimpy", couples=("2.0",)),
     Tool(
         "Ecos",
@@ -133,23 +133,23 @@ TOOLS = (
 
 
 CASADI = Tool("CasADi", (), package="casadi")
-"""It integrates and differentiates FMUs for model exchange, and steps none."""
+"""CasADi integrates and differentiates FMUs for model exchange; it steps none."""
 
 
 class ToolFailedError(Exception):
-    """A tool gave no values; the text has its last words."""
+    """A tool gave no values; the text has its last output."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a tool made of FMUs that nobody sets anything for.
+    """Results of a tool with FMUs at their own start values.
 
     Attributes
     ----------
     rows : list of list of float
         The outputs after each step.
     complaints : tuple of str
-        Lines of warnings and errors that it wrote.
+        Lines of warnings and errors that the tool wrote.
     """
 
     rows: Rows
@@ -157,46 +157,46 @@ class Answer:
 
 
 def run(tool: Tool, fmu: Path, names: Sequence[str], step: float, count: int, folder: Path) -> Answer:
-    """Return what a tool makes of an FMU.
+    """Return a tool's results with an FMU.
 
     Parameters
     ----------
     tool : Tool
     fmu : Path
     names : sequence of str
-        Outputs.
+        Names of outputs.
     step : float
         Communication step, s: a whole number of nanoseconds, in which libcosim counts.
     count : int
-        Steps.
+        Number of steps.
     folder : Path
-        Where files may be written.
+        Folder for temporary files.
 
     Raises
     ------
     ToolFailedError
-        It gave no values.
+        The tool gave no values.
     """
-    return _asked(tool, {"fmu": str(fmu), "names": list(names), "step": step, "count": count}, folder)
+    return _answer(tool, {"fmu": str(fmu), "names": list(names), "step": step, "count": count}, folder)
 
 
 def run_integrated(
     tool: Tool, fmu: Path, names: Sequence[str], step: float, count: int, folder: Path, tolerance: float
 ) -> Answer:
-    """Return what a tool makes of an FMU for model exchange that it integrates, at a relative tolerance."""
-    asked = {"fmu": str(fmu), "names": list(names), "step": step, "count": count, "tolerance": tolerance}
-    return _asked(tool, asked, folder)
+    """Return a tool's results with an FMU for model exchange, integrated at a relative tolerance."""
+    order = {"fmu": str(fmu), "names": list(names), "step": step, "count": count, "tolerance": tolerance}
+    return _answer(tool, order, folder)
 
 
 def steps_of(tool: Tool, fmu: Path, folder: Path, stop_time: float, tolerance: float) -> int:
-    """Return how many steps the integrator of a tool takes to an instant, s, at a relative tolerance.
+    """Return the number of steps that a tool's integrator takes up to an instant, s, at a relative tolerance.
 
     Raises
     ------
     ToolFailedError
-        It gave no number, or warned.
+        The tool gave no number, or warned.
     """
-    answer = _asked(tool, {"fmu": str(fmu), "stop_time": stop_time, "tolerance": tolerance}, folder)
+    answer = _answer(tool, {"fmu": str(fmu), "stop_time": stop_time, "tolerance": tolerance}, folder)
     if answer.complaints:
         raise ToolFailedError("\n".join(answer.complaints))
     return round(answer.rows[0][0])
@@ -211,44 +211,44 @@ def run_coupled(
     count: int,
     folder: Path,
 ) -> Answer:
-    """Return what a tool makes of FMUs that it couples: `names` and `connections` are of `component.variable`."""
-    asked = {"fmus": {name: str(path) for name, path in fmus.items()}, "connections": list(connections)}
-    return _asked(tool, {**asked, "names": list(names), "step": step, "count": count}, folder)
+    """Return a tool's results with coupled FMUs; `names` and `connections` are in the form `component.variable`."""
+    order = {"fmus": {name: str(path) for name, path in fmus.items()}, "connections": list(connections)}
+    return _answer(tool, {**order, "names": list(names), "step": step, "count": count}, folder)
 
 
 def run_system(
     tool: Tool, system: Path, names: Sequence[str], step: float, count: int, folder: Path
 ) -> Answer:
-    """Return what a tool makes of a system (SSP), with the step that it proposes; `names` are `component.variable`."""
+    """Return a tool's results with a system (SSP), with the step that it proposes; `names` are `component.variable`."""
     with zipfile.ZipFile(system) as archive:
         inside = [name for name in archive.namelist() if name.endswith(".fmu")]
         fmus = {Path(name).stem: archive.extract(name, folder) for name in inside}
         description = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
-    asked = {"system": str(system), "model": description.get("name"), "fmus": fmus}
-    return _asked(tool, {**asked, "names": list(names), "step": step, "count": count}, folder)
+    order = {"system": str(system), "model": description.get("name"), "fmus": fmus}
+    return _answer(tool, {**order, "names": list(names), "step": step, "count": count}, folder)
 
 
-def _asked(tool: Tool, request: Mapping[str, Any], folder: Path) -> Answer:
+def _answer(tool: Tool, request: Mapping[str, Any], folder: Path) -> Answer:
     answer = folder / "answer.json"
     answer.unlink(missing_ok=True)
-    asked = {
+    order = {
         **request,
         "tool": tool.name,
         "program": tool.path() if tool.program else "",
         "answer": str(answer),
     }
     done = subprocess.run(
-        [tool.python, "-m", "exchange._drive", json.dumps(asked)],
+        [tool.python, "-m", "exchange._drive", json.dumps(order)],
         capture_output=True,
         text=True,
         timeout=LIMIT,
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT / "tests")},
     )
-    said = f"{done.stdout}\n{done.stderr}"
+    text = f"{done.stdout}\n{done.stderr}"
     if not answer.is_file():
-        raise ToolFailedError(f"{tool.name} gave nothing: {said.strip()[-1000:]}")
-    lines = (line.strip() for line in said.splitlines())
-    told = (line for line in lines if not COUNTS.search(line) and not OF_ITSELF.search(line))
-    complaints = tuple(line for line in told if WARNING.search(line))
+        raise ToolFailedError(f"{tool.name} gave nothing: {text.strip()[-1000:]}")
+    lines = (line.strip() for line in text.splitlines())
+    candidates = (line for line in lines if not COUNTS.search(line) and not OF_ITSELF.search(line))
+    complaints = tuple(line for line in candidates if WARNING.search(line))
     return Answer(json.loads(answer.read_text()), complaints)

@@ -1,4 +1,4 @@
-"""CasADi integrates our bodies, and differentiates their flights: no variable is in its way, and states can be set."""
+"""CasADi integrates our bodies, and differentiates their flights: it accepts all variables, and can set states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FLIGHT = 3.0
 
 
 def exact_flow(time: float) -> np.ndarray:
-    """Return the matrix that takes displacement and velocity over a time of free flight."""
+    """Return the matrix of free flight over a time, acting on displacement and velocity."""
     decay = DAMPING / (2.0 * MASS)
     ringing = np.sqrt(STIFFNESS / MASS - decay**2)
     c, s = np.cos(ringing * time), np.sin(ringing * time) / ringing
@@ -36,7 +36,7 @@ def test_a_flight_and_its_gradient_are_ours(tmp_path: Path, version: str) -> Non
         archive.extractall(tmp_path / "unpacked")
     dae = ca.DaeBuilder("body", str(tmp_path / "unpacked"))
     assert sorted(dae.x()) == ["displacement", "velocity"]
-    # a variable that is a state, a derivative and an output had stopped it; truth values it reads as numbers, wrongly
+    # CasADi stopped at a variable that was a state, a derivative and an output; it misreads truth values as numbers
     assert {"displacement", "velocity"} < set(dae.y())
     dae.set_y(["displacement", "velocity", "acceleration"])
     ode, y = dae.create("both", ["x", "u"], ["ode", "y"])([DISPLACED, 0.5], dae.start(dae.u()))
@@ -45,7 +45,7 @@ def test_a_flight_and_its_gradient_are_ours(tmp_path: Path, version: str) -> Non
     assert np.array(y).ravel() == pytest.approx([DISPLACED, 0.5, pushed])
     dynamics = dae.create("dynamics", ["x"], ["ode"])
     x, x0 = ca.MX.sym("x", 2), ca.MX.sym("x0", 2)
-    # its differences: an FMU has no second derivatives, which the sensitivities of its integrator need
+    # CasADi's own differences: its integrator's sensitivities need second derivatives, which an FMU lacks
     differences = {
         "enable_forward": False,
         "enable_reverse": False,

@@ -1,4 +1,4 @@
-"""The program that runs an FMU's library where no other tool does, on this machine; `make exchange` has the others."""
+"""The program that runs an FMU's library without any tool, tried on this machine; `make exchange` tries the others."""
 
 from __future__ import annotations
 

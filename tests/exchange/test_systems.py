@@ -1,7 +1,7 @@
-"""A scene of components as an SSP archive in other tools: its own run to 1e-9, with nothing set and nothing edited.
+"""A scene of components as an SSP archive in other tools: our own run to 1e-9, with nothing set and nothing edited.
 
-Where a gain is a component and a tool exchanges values once a step, it is the motion whose springs answer one step
-late.
+If a gain is a component and a tool exchanges values once a step, the springs answer one step late. The reference is
+then a motion with such springs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every lean FMU in every tool that speaks its version is our own run to 1e-9, with nothing set and nothing edited."""
+"""Every lean FMU in every tool for its version gives our own run to 1e-9, with nothing set and nothing edited."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from exchange._tools import TOOLS, Tool, run, run_coupled, run_integrated
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
-# what is no package of the extra exchange is tried by `make exchange` alone
+# tools outside of the extra `exchange` are tried by `make exchange` alone
 TRIED = [tool for tool in TOOLS if tool.package and tool.name != "PyFMI"]
 QUICK = ("oscillator", "chain of 3", IMPACT_STOP, REPLAY)
 SINGLE = [(tool, fmi, name) for tool in TRIED for fmi in tool.versions for name in NAMES]
-# one tool tells of the others: `make exchange` has all cases in all of them
+# FMPy runs all cases here, other tools the quick ones; `make exchange` runs all cases in all tools
 SINGLE = [(tool, fmi, name) for tool, fmi, name in SINGLE if tool.name == "FMPy" or name in QUICK]
 INTEGRATED = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in STEPS]
 COUPLED = [(tool, fmi) for tool in TRIED for fmi in tool.couples]
@@ -60,7 +60,7 @@ def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fm
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_counts_and_speeds_of_a_case_are_those_of_the_impacts_of_its_dataset(name: str) -> None:
-    # what no time series has is a run of our importer: here it is held against the table of impacts
+    # outputs beyond the time series come from our importer: here they are checked by the table of impacts
     ours, case = our_run(name), CASES[name]
     inside = ours.impacts["impact_time"] <= case.count / case.rate
     assert inside.sum() > 2
@@ -76,8 +76,8 @@ def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Pat
     tool = next(tool for tool in TRIED if tool.name == "FMPy")
     skip_where_missing(tool)
     it = made(name, "2.0", tmp_path).integrated(STEPS[name])
-    asked = (tool, it.path, it.outputs, it.step, len(it.rows), tmp_path)
-    found = [np.array(run_integrated(*asked, tolerance).rows) for tolerance in TOLERANCES]
+    arguments = (tool, it.path, it.outputs, it.step, len(it.rows), tmp_path)
+    found = [np.array(run_integrated(*arguments, tolerance).rows) for tolerance in TOLERANCES]
     errors = [difference(rows[it.quiet], it.rows[it.quiet]) for rows in found]
     judged = [
         (error, tolerance) for error, tolerance in zip(errors, TOLERANCES, strict=True) if tolerance < USUAL
@@ -89,7 +89,7 @@ def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Pat
 @pytest.mark.parametrize(("tool", "fmi"), COUPLED, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi in COUPLED])
 def test_two_exports_that_another_tool_couples_are_our_own_run(tmp_path: Path, tool: Tool, fmi: str) -> None:
     skip_where_missing(tool)
-    name = "a spring between them"  # the one whose both ends are inputs; `make exchange` has the other too
+    name = "a spring between them"  # its ends are both inputs; `make exchange` has the other pair too
     it = made_pair(name, tool, fmi, tmp_path)
     answer = run_coupled(tool, it.fmus, PAIRS[name].connections, it.outputs, 1.0 / RATE, COUNT, tmp_path)
     rows = np.array(answer.rows)
@@ -125,7 +125,7 @@ print(*(observer.last_real_values(index, [int(sys.argv[2])])[0] for index in (0,
 
 
 def test_two_exports_of_one_component_are_two_fmus_in_a_system_of_libcosim(tmp_path: Path) -> None:
-    # it knows FMUs by their token, and gave both the resources, and so the start values, of one
+    # libcosim identifies FMUs by their token, and gave both FMUs the resources, and so the start values, of one
     pytest.importorskip("libcosimpy")
     with zipfile.ZipFile(tmp_path / "pair.ssp", "w") as archive:
         archive.writestr("SystemStructure.ssd", SYSTEM)

@@ -1,5 +1,5 @@
-/* A step that ends early for want of budget, and is gone on with, is the same step bit for bit; a motion that does not
- * go on, or leaves the numbers, is given up. */
+/* A step that ends early for want of budget and is continued equals the whole step bit for bit. A motion that stands
+ * still or overflows is given up. */
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/structure.h"
@@ -16,7 +16,7 @@ static vi_record record;
 static vi_pressed pressed;
 static vi_scan scan;
 
-/* Rattles between two elastic stops: many impacts. */
+/* A body that rattles between two elastic stops, with many impacts. */
 static vi_structure rattling(int modes, double gap)
 {
     memset(&model, 0, sizeof model);
@@ -45,7 +45,7 @@ static vi_structure rattling(int modes, double gap)
     return s;
 }
 
-/* Under a force with a slope: an input that must not start anew. */
+/* The same body under a force with a slope: an input that must not start anew. */
 static vi_structure begin(int modes, double gap)
 {
     const double held[VI_MODES] = {0.1}, slope[VI_MODES] = {0.01};

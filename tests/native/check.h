@@ -1,4 +1,4 @@
-/* What the C tests share: a check that stays in release builds, and random numbers that are the same everywhere. */
+/* Shared by the C tests: a check that stays in release builds, and random numbers that are the same everywhere. */
 #ifndef VIBROIMPACT_TEST_CHECK_H
 #define VIBROIMPACT_TEST_CHECK_H
 

@@ -1,4 +1,4 @@
-/* Instants: to time and back, sums, and the phase after ever so many periods. */
+/* Instants: conversion to time and back, sums, and the phase after any number of periods. */
 #include "motion/clock.h"
 
 #include <float.h>
@@ -16,7 +16,7 @@ static void times_come_back(uint64_t *seed)
         vi_instant instant;
         CHECK(vi_clock_instant(&clock, time, 0.0, &instant), "time %g", time);
         CHECK(instant.rest >= 0.0 && instant.rest < clock.period, "rest %g of %g", instant.rest, clock.period);
-        /* an instant may be put on the start of its period */
+        /* an instant may be moved to the start of its period */
         const double back = vi_clock_time(&clock, instant);
         CHECK(fabs(back - time) <= 4.0 * DBL_EPSILON * (fabs(time) + DBL_EPSILON * clock.period), "%.17g came back as %.17g", time, back);
         const double seconds = uniform(seed, 0.0, 5.0) * clock.period;
@@ -64,7 +64,7 @@ static void another_frequency_keeps_time_phase_and_what_was(uint64_t *seed)
             CHECK(fabs(vi_clock_time(&clock, now) - was) <= 2.0 * DBL_EPSILON * was, "time %.17g of %.17g", was, other);
             CHECK(apart(vi_clock_phase(&clock, now), phase) <= 1e-14, "phase %.17g at %.17g", phase, other);
             const double ago = vi_clock_time(&clock, past);
-            counted = counted && was / clock.period < 1e15; /* else it is as long ago as can be counted */
+            counted = counted && was / clock.period < 1e15; /* otherwise it is as long ago as can be counted */
             CHECK(!counted || fabs(ago - earlier) <= 64.0 * DBL_EPSILON * time, "%.17g was %.17g", earlier, ago);
             if (other < 1e6 && other > 1e-6) {
                 const double later = was + uniform(seed, 0.0, 3.0) * clock.period;
@@ -108,7 +108,7 @@ static void a_million_periods_keep_the_phase(void)
         instant = vi_clock_after(&clock, instant, part);
     }
     const vi_instant target = {1000000, 0.0, 0.0};
-    /* a third of a period is a double: off by half a rounding each time, in the same direction */
+    /* a third of a period is a double: wrong by half a rounding each time, in the same direction */
     const double lost = fabs(vi_clock_elapsed(&clock, instant, target));
     CHECK(lost <= 3e6 * DBL_EPSILON * part, "%g lost", lost);
 }

@@ -1,4 +1,4 @@
-/* Forces that only push: the conditions of the problem itself, in any order of contacts, redundant ones too. */
+/* Forces that only push fulfil the conditions of the problem, in any order of contacts, also for redundant contacts. */
 #include "contact/complementarity.h"
 
 #include <float.h>
@@ -77,12 +77,12 @@ static void random_problems(uint64_t *seed)
             b[k] = choice(seed, 4) == 0 ? 0.0 : scale * uniform(seed, -1.0, 1.0);
         }
         vi_complementary(n, g, b, p);
-        check_conditions(n, g, b, p, 1e-10, run); /* elimination at a condition number of up to 1e5 */
+        check_conditions(n, g, b, p, 1e-10, run); /* elimination at a condition number of at most 1e5 */
         check_order(seed, n, g, b, p, 1e-9, run);
     }
 }
 
-/* The loads that stops of a common body can ask for: b = g c, so that there is an answer however singular g is. */
+/* Loads that stops of a common body can demand: b = g c, so that an answer exists for any singular g. */
 static void redundant_contacts(uint64_t *seed)
 {
     double g[VI_PORTS][VI_PORTS], b[VI_PORTS], p[VI_PORTS];
@@ -100,7 +100,7 @@ static void redundant_contacts(uint64_t *seed)
             }
         }
         vi_complementary(n, g, b, p);
-        /* each redundant contact yields by 1e-9 of the mobility (complementarity.c): that much is left open */
+        /* redundant contacts are softened by 1e-6 of the mobility (complementarity.c) */
         check_conditions(n, g, b, p, 1e-5, run);
     }
 }

@@ -1,4 +1,4 @@
-/* Correlation sums against a count of all pairs, one by one. */
+/* Correlation sums against a count of all pairs. */
 #include "door/correlation.h"
 
 #include <math.h>
@@ -21,7 +21,7 @@ static double radius(double lowest, int k)
                  exponent - 1 + place / VI_RADII_PER_OCTAVE);
 }
 
-/* Pairs nearer than radius k in m dimensions, from the table. */
+/* Number of pairs nearer than radius k in m dimensions, from the table. */
 static uint64_t counted(int m, int k)
 {
     uint64_t sum = 0;

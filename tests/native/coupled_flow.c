@@ -1,4 +1,4 @@
-/* The coupled motion against a Runge-Kutta integration of the same equations in small steps, written here. */
+/* The coupled motion against a Runge-Kutta integration of the same equations in small steps. */
 #include "body/modal/coupled_flow.h"
 
 #include <math.h>
@@ -41,7 +41,7 @@ static void slope(double u, const double y[2 * MODES], double dy[2 * MODES])
             dy[MODES + j] -= sign[k] * model.shape[k][j] * force;
         }
     }
-    for (int j = 0; j < MODES && press[0].kind == VI_PRESS_HOLD; ++j) { /* contact 1 is held after all others pressed */
+    for (int j = 0; j < MODES && press[0].kind == VI_PRESS_HOLD; ++j) { /* contact 1 is held against all other forces */
         b += model.shape[0][j] * dy[MODES + j];
         g += model.shape[0][j] * model.shape[0][j];
     }
@@ -141,7 +141,7 @@ int main(void)
         vi_drift_at(&drift, u, before, p_end, q_end);
         runge_kutta(u, y);
         for (int j = 0; j < MODES; ++j) {
-            /* Runge-Kutta errs by (rate h)^4, rate u < 1: some 1e-11 in 400 steps; the power laws by their tolerance */
+            /* Runge-Kutta errs by (rate h)^4, rate u < 1: some 1e-11 in 400 steps; power laws err by their tolerance */
             CHECK(fabs(q_end[j] - y[j]) <= 1e-9 && fabs(p_end[j] - y[MODES + j]) <= 2e-9 * (1.0 + 1.0 / u),
                   "run %d: mode %d: %.17g, %.17g and %.17g, %.17g", run, j, q_end[j], p_end[j], y[j], y[MODES + j]);
         }

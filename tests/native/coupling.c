@@ -1,5 +1,5 @@
-/* The loop over coupled components: clocks of both FMI versions that tick at instants of their own meet all of them, in
- * order; and whatever components answer, the loop comes back and the time does not go back. */
+/* The loop over coupled components. Clocks of both FMI versions tick at instants of their own: the loop meets all
+ * instants in order. For any answers of the components the loop returns, and time never goes back. */
 #include "door/coupling.h"
 
 #include <math.h>
@@ -21,8 +21,8 @@ typedef struct {
     double step_time, step_size, last_time;
     unsigned char flags[4], decisions[2];
     bool in_event_mode;
-    double rounding; /* of the times that it is given beside its own, s: steps of one size add up otherwise */
-    uint64_t *liar; /* NULL: it answers what is true */
+    double rounding; /* accepted difference of a given time, s: steps of one size add up otherwise */
+    uint64_t *liar; /* NULL: all its answers are true */
 } clock_fmu;
 
 static clock_fmu clocks[MOST];
@@ -179,7 +179,7 @@ static vi_coupling_call call_of(int i, int kind, vi_coupling_function function, 
                               .note = i + 1};
 }
 
-/* Clock `i`, whose input is the time of the clock before it. */
+/* Set up clock `i`, whose input is the time of the clock before it. */
 static void make(int i, int version, double period, uint64_t *liar)
 {
     clock_fmu *c = &clocks[i];
@@ -240,7 +240,7 @@ static vi_coupling_plan plan_of(int count)
                               .noted_time = &noted_time};
 }
 
-/* ---- what must hold ---- */
+/* ---- claims ---- */
 
 static double events[EVENTS][3];
 static int32_t at_event[MOST];
@@ -260,7 +260,7 @@ static vi_coupling_progress from_zero(double macro_step)
     return (vi_coupling_progress){.next_point = macro_step, .event_time = (double)-INFINITY};
 }
 
-/* Periods of eighths: clocks tick together now and then, at instants without rounding. */
+/* Periods are multiples of 1/8: clocks sometimes tick together, at instants without rounding. */
 static void every_clock_ticks_at_its_instants(uint64_t *seed)
 {
     const int count = 1 + (int)choice(seed, MOST);
@@ -271,25 +271,26 @@ static void every_clock_ticks_at_its_instants(uint64_t *seed)
     const vi_coupling_plan plan = plan_of(count);
     vi_coupling_progress progress = from_zero(macro_step);
     vi_coupling_run run = run_to(end, macro_step);
-    const int came_to = vi_door_coupling(&plan, &progress, &run);
-    CHECK(came_to == VI_COUPLING_DONE && progress.time == end, "%d at %g", came_to, progress.time);
-    int64_t told = 0;
+    const int result = vi_door_coupling(&plan, &progress, &run);
+    CHECK(result == VI_COUPLING_DONE && progress.time == end, "%d at %g", result, progress.time);
+    int64_t ticks = 0;
     for (int i = 0; i < count; ++i) {
         const clock_state *s = &clocks[i].state;
         CHECK(s->ticks == (int64_t)floor(end / s->period) && s->time == end, "%d ticks of %g", (int)s->ticks,
               s->period);
         CHECK(i == 0 || s->input == end, "%g", s->input);
-        told += s->ticks;
+        ticks += s->ticks;
     }
-    CHECK(told == run.events_used, "%d told, %d ticks", (int)run.events_used, (int)told);
-    for (int64_t k = 1; k < told; ++k) {
+    CHECK(ticks == run.events_used, "%d events, %d ticks", (int)run.events_used, (int)ticks);
+    for (int64_t k = 1; k < ticks; ++k) {
         const bool is_same = events[k][0] == events[k - 1][0];
         CHECK(events[k][0] >= events[k - 1][0] && events[k][1] == (is_same ? events[k - 1][1] + 1.0 : 0.0), "%g",
               events[k][0]);
     }
 }
 
-/* A room for few events: the loop leaves the step with an event too many, and goes on when that is finished. */
+/* With room for few events the loop leaves the step with an event too many to the caller, and goes on once it is
+ * finished. */
 static void events_without_room_are_left_to_the_caller(uint64_t *seed)
 {
     make(0, VERSION_3, 0.5, NULL);
@@ -297,13 +298,13 @@ static void events_without_room_are_left_to_the_caller(uint64_t *seed)
     vi_coupling_progress progress = from_zero(INFINITY);
     vi_coupling_run run = run_to(20.0, INFINITY);
     run.events_room = choice(seed, 7);
-    const int came_to = vi_door_coupling(&plan, &progress, &run);
+    const int result = vi_door_coupling(&plan, &progress, &run);
     const double left = 0.5 * (double)(run.events_room + 1);
-    CHECK(came_to == VI_COUPLING_REACHED && run.arrived == 1 && run.reached == left, "%d at %g", came_to, run.reached);
+    CHECK(result == VI_COUPLING_REACHED && run.arrived == 1 && run.reached == left, "%d at %g", result, run.reached);
     CHECK(run.events_used == run.events_room && progress.time == left - 0.5, "%g", progress.time);
 }
 
-/* A component of one size of steps is given exactly that, and no step that another's event or the end has cut. */
+/* A component with one step size gets exactly this size, and no step cut by another's event or by the end. */
 static void a_component_of_one_step_size_is_given_no_other(uint64_t *seed)
 {
     const double step = 1e-3, period = 1e-3 * (1.5 + (double)choice(seed, 40));
@@ -314,16 +315,16 @@ static void a_component_of_one_step_size_is_given_no_other(uint64_t *seed)
     const vi_coupling_plan plan = plan_of(2);
     vi_coupling_progress progress = from_zero(step);
     vi_coupling_run run = run_to(0.1, step);
-    const int came_to = vi_door_coupling(&plan, &progress, &run);
+    const int result = vi_door_coupling(&plan, &progress, &run);
     if (clocks[0].state.period == period) {
-        CHECK(came_to == VI_COUPLING_CUT && run.at == 1, "%d at %d", came_to, run.at);
+        CHECK(result == VI_COUPLING_CUT && run.at == 1, "%d at %d", result, run.at);
         CHECK(clocks[1].state.time < period && run.goal == period, "%g of %g", run.goal, period);
     } else {
-        CHECK(came_to == VI_COUPLING_DONE && clocks[1].step_size == step, "%d, %.17g", came_to, clocks[1].step_size);
+        CHECK(result == VI_COUPLING_DONE && clocks[1].step_size == step, "%d, %.17g", result, clocks[1].step_size);
     }
 }
 
-/* Whatever they answer: the loop comes back with one of its reasons, and nobody's time goes back or beyond the end. */
+/* For any answers the loop returns with one of its reasons, and no time goes back or beyond the end. */
 static void liars_end_the_loop_and_never_hold_it(uint64_t *seed)
 {
     const int count = 1 + (int)choice(seed, MOST);
@@ -336,10 +337,10 @@ static void liars_end_the_loop_and_never_hold_it(uint64_t *seed)
     run.hears_pauses = (int32_t)choice(seed, 2);
     double before = 0.0;
     for (int call = 0; call < 20; ++call) {
-        const int came_to = vi_door_coupling(&plan, &progress, &run);
-        CHECK(came_to >= VI_COUPLING_DONE && came_to <= VI_COUPLING_ENDLESS, "%d", came_to); /* none has one size */
+        const int result = vi_door_coupling(&plan, &progress, &run);
+        CHECK(result >= VI_COUPLING_DONE && result <= VI_COUPLING_ENDLESS, "%d", result); /* all take any size */
         CHECK(progress.time >= before && progress.time <= run.end, "%g after %g", progress.time, before);
-        CHECK(came_to != VI_COUPLING_FAILED || run.status < 0 || run.status > 1, "%d", run.status);
+        CHECK(result != VI_COUPLING_FAILED || run.status < 0 || run.status > 1, "%d", run.status);
         CHECK(run.arrived <= count && run.events_used <= EVENTS, "%d", run.arrived);
         before = progress.time;
         run.events_used = 0;

@@ -1,4 +1,4 @@
-/* The entry into a power law against a Runge-Kutta integration over the square root of time, written here. */
+/* The entry into a power law against a Runge-Kutta integration over the square root of time. */
 #include "body/modal/entry_flow.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@ static vi_press press[VI_PORTS];
 static const double sign[VI_PORTS] = {-1.0, 1.0}, start_at[VI_PORTS] = {0.0, -0.7};
 static double start_q[VI_MODES], phase;
 
-/* Slopes over r, time being r^2; y: displacements, velocities, impulse of the contact. */
+/* Slopes over r, with time r^2; y: displacements, velocities, impulse of the contact. */
 static void slope(double r, const double y[2 * MODES + 1], double dy[2 * MODES + 1])
 {
     const double u = r * r;
@@ -60,7 +60,7 @@ static void runge_kutta(double length, double y[2 * MODES + 1])
     }
 }
 
-/* A body that moves into its first contact, and away from its second one. */
+/* Make a body that moves into its first contact, and away from its second. */
 static void make(uint64_t *seed, double p[VI_MODES])
 {
     const double w = uniform(seed, 0.1, 3.0);
@@ -91,7 +91,7 @@ static void make(uint64_t *seed, double p[VI_MODES])
     vi_structure_prepare(&model);
 }
 
-/* Does the first contact stay pressed up to r, as far as its terms tell? */
+/* Do the terms prove that the first contact stays pressed up to r? */
 static bool stays_pressed(const vi_drift *drift, double r)
 {
     double inward[VI_ORDER + 1] = {0.0};

@@ -1,4 +1,4 @@
-/* A body that its importer integrates: impacts, chatter to rest and release, stops that yield, by plain steps of Euler. */
+/* A body integrated by its importer with plain Euler steps: impacts, chatter to rest and release, stops that yield. */
 #include "body/modal/structure/exchange.h"
 #include "body/modal/structure/structure.h"
 
@@ -17,7 +17,7 @@ static vi_exchange_body body_of(void)
     return (vi_exchange_body){.parts = {&model, &state, contacts, &record}, .modes = 1, .contacts = 2, .scale = 1.0};
 }
 
-/* One mode of rate 1, a stop at `position` of a law, a start at `displacement`; pressed by a constant load. */
+/* One mode of rate 1 with a stop at `position`, from `displacement`, pressed by a constant load. */
 static vi_exchange_body begin(vi_contact_law law, double position, double displacement, double load)
 {
     memset(&model, 0, sizeof model);
@@ -56,7 +56,7 @@ static void handle(const vi_exchange_body *body)
     vi_exchange_go_on(body);
 }
 
-/* Integrate by the symplectic rule of Euler; an event at each end of a step where an indicator is not positive. */
+/* Integrate by the symplectic Euler rule, with an event after each step at which an indicator is not positive. */
 static void integrate(const vi_exchange_body *body, double from, double to, int steps)
 {
     const double step = (to - from) / steps;
@@ -87,7 +87,7 @@ int main(void)
     CHECK(fabs(contacts[0].last_time - 2.0943951) < 1e-3, "impact at %.9g", contacts[0].last_time);
     CHECK(fabs(contacts[0].last_velocity - 0.8660254) < 1e-3, "with %.9g", contacts[0].last_velocity);
 
-    /* a plastic stop holds what is pressed, until the load turns */
+    /* a plastic stop holds the pressed body until the load reverses */
     const vi_contact_law plastic = vi_contact_law_rigid(0.0);
     body = begin(plastic, 0.0, -0.1, 1.0);
     handle(&body);
@@ -99,7 +99,7 @@ int main(void)
     integrate(&body, 1.0, 1.5, 5000);
     CHECK(!contacts[0].stuck && state.q[0] < -0.1, "x %g", state.q[0]);
 
-    /* each law that yields gives back less than it took */
+    /* each law that yields returns less energy than it took */
     const vi_contact_law yielding[] = {
         {.law = vi_contact_law_number("kelvin_voigt"), .stiffness = 1e3, .damping = 5.0},
         {.law = vi_contact_law_number("hertz"), .stiffness = 1e4},
@@ -115,7 +115,7 @@ int main(void)
         CHECK(energy < 0.5 + 1e-3 && energy > 0.1, "law %d: energy %g", law, energy);
     }
 
-    /* what an integrator cannot follow */
+    /* set-ups that no integrator can follow */
     const vi_contact_law external = vi_contact_law_asking();
     body = begin(rigid, 0.5, -1.0, 0.0);
     contacts[0].law = external;

@@ -1,4 +1,4 @@
-/* What both adapters share: instances, variables and saved states, of a small component made for this test. */
+/* The common part of both adapters: instances, variables and saved states, for a small component of this test. */
 #include "../../fmus/native/adapters/instance.c"
 #include "../../fmus/native/adapters/model_exchange.c"
 #include "../../fmus/native/adapters/resources.c"
@@ -11,7 +11,7 @@ typedef struct {
     int64_t count;
     int32_t flag;
     int64_t used;      /* rows */
-    double rows[1000]; /* last: saved as far as it is used */
+    double rows[1000]; /* last member: saved as far as it is used */
 } thing;
 
 static const vi_variable thing_variables[] = {
@@ -33,7 +33,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     if (t->parameter > 0.0) {
         return true;
     }
-    /* as long a message as there may be */
+    /* the longest message */
     memset(message, 'x', VI_MESSAGE_LENGTH - 1);
     message[VI_MESSAGE_LENGTH - 1] = '\0';
     return false;
@@ -126,13 +126,13 @@ static void states_come_back_and_damaged_ones_do_not(uint64_t *seed)
         for (int64_t row = 0; row < t->used; ++row) {
             t->rows[row] = t->time + (double)row;
         }
-        if (choice(seed, 3) == 0) { /* else the slot is used again */
+        if (choice(seed, 3) == 0) { /* otherwise the slot is reused */
             vi_state_free(&saved);
         }
         CHECK(vi_state_save(instance, "save", &saved), "%s", "save");
         size_t size = 0;
         CHECK(vi_state_size(instance, saved, &size), "%s", "size");
-        unsigned char *bytes = malloc(size); /* of this very size: the sanitizer sees a byte too many */
+        unsigned char *bytes = malloc(size); /* of exactly this size, so that the sanitizer sees a byte too many */
         CHECK(bytes != NULL, "%s", "memory");
         CHECK(!vi_state_write(instance, saved, bytes, size - 1), "%s", "no room");
         CHECK(vi_state_write(instance, saved, bytes, size), "%s", "write");
@@ -263,7 +263,7 @@ static void any_references_do_no_harm(uint64_t *seed, const char *folder)
 int main(int count, char *arguments[])
 {
     CHECK(count > 0, "%d", count);
-    /* beside this program, in a folder of its own */
+    /* next to this program, in a folder of its own */
     char *folder = arguments[0];
     *strrchr(folder, '/') = '\0';
     uint64_t seed = 5;

@@ -1,5 +1,5 @@
-/* Random points in lanes, bad ones among them: the same bits in every instruction set, whatever the room for rows and the
- * time of a call, and branches that wait for the scalar engine. */
+/* Random points in lanes, including bad ones: every instruction set gives the same bits, for any room for rows and any
+ * time of a call. Branches wait for the scalar engine. */
 #include "lanes/lanes.h"
 
 #include <float.h>
@@ -13,7 +13,7 @@
 
 enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
 
-/* Arrays of some points, and what they come to. */
+/* Arrays of points. */
 typedef struct {
     double stiffness[STATES], decay[STATES], force[STATES], held[STATES], observed[STATES], start_q[STATES],
         start_p[STATES];
@@ -29,11 +29,12 @@ typedef struct {
     int8_t outcome[POINTS];
     double reached[POINTS], displacement[POINTS], velocity[POINTS], final_q[STATES], final_p[STATES];
     int64_t rows_of[POINTS];
-    double sum_of_rows[POINTS]; /* of all numbers of a point's rows, in their order */
+    double sum_of_rows[POINTS]; /* sum of all numbers in a point's rows, in their order */
 } results;
 
 static const double TURN = 6.283185307179586;
-/* Of all results, on every processor and with every C library: where they change, so does ENGINE (orchestrator/run). */
+/* Hash of all results, on every processor and with every C library; when it changes, ENGINE (orchestrator/run) must
+ * change. */
 static const uint64_t BITS = 0x278ed239e40a0061u;
 
 static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed)
@@ -67,7 +68,7 @@ static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed
     s->first[i] = 1;
 }
 
-/* A number that no point can have, somewhere. */
+/* Put a number that no point can have somewhere. */
 static void spoil(sample *s, int i, uint64_t *seed)
 {
     double *const arrays[] = {s->stiffness,         s->decay, s->force, s->held, s->start_q, s->start_p,
@@ -122,7 +123,7 @@ static vi_lanes_points points_of(const sample *s, results *r, double *rows, int6
                              .most_seconds = seconds};
 }
 
-/* Answer the points that are left as a scalar engine would: they end where they began. */
+/* Answer the points left as a scalar engine would: with an end state, here always the same. */
 static void answer(vi_lanes_points *p, int modes)
 {
     for (int64_t i = 0; i < p->count; ++i) {
@@ -176,7 +177,7 @@ static uint64_t hashed(uint64_t hash, const void *data, size_t size)
     return hash;
 }
 
-/* All bits of what the points come to, after those of the sizes before. */
+/* Hash all bits of the results, after the bits of the sizes before. */
 static uint64_t hash_of(uint64_t hash, const results *r, int modes)
 {
     for (int i = 0; i < POINTS; ++i) {
@@ -232,7 +233,7 @@ static void check_sizes(int modes, int contacts, uint64_t *seed, uint64_t *hash)
     CHECK(ran > POINTS / 3, "most points to run in lanes, got %d of %d modes", ran, modes);
 }
 
-/* The functions that the lanes have of their own, beside those of the C library. */
+/* The lanes' own functions against the C library. */
 static void check_functions(uint64_t *seed)
 {
     for (int i = 0; i < 20000; ++i) {

@@ -1,5 +1,5 @@
-/* Local segments of several modes, begun side by side, are those of each mode alone, to the last bit; at their start and
- * their end they are what the displacement and velocity that they were begun with say. */
+/* Local segments of several modes begun together equal those of single modes to the last bit. At their start and end
+ * they agree with the given displacement and velocity. */
 #include "motion/flow.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-/* The length of two numbers is that of the C library to a unit in the last place; a power of two is the nearest. */
+/* The length of two numbers is the C library's to a unit in the last place; the power of two is the nearest. */
 #include "motion/magnitude.h"
 
 #include <float.h>

@@ -1,4 +1,4 @@
-/* A certified step never passes a root of any motion whose fourth derivative keeps its bound. */
+/* A certified step never passes a root of a motion whose fourth derivative keeps its bound. */
 #include "motion/majorant.h"
 
 #include <stdbool.h>
@@ -45,7 +45,7 @@ int main(void)
                       p.acceleration, p.jerk, p.bound, left, part, s);
             }
         }
-        /* it moves on from everywhere but a contact */
+        /* steps are > 0 except at a contact */
         const bool leaves = p.velocity < 0.0 || (p.velocity == 0.0 && p.acceleration < 0.0)
                             || (p.velocity == 0.0 && p.acceleration == 0.0 && p.jerk < 0.0);
         stalled += s == 0.0 && horizon > 0.0 && (p.clearance > 0.0 || leaves);

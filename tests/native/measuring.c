@@ -1,4 +1,4 @@
-/* The measuring chain: published numbers of the generator, and cells, converters and noise under numbers of every kind. */
+/* The measuring chain: published numbers of the generator; cells, converters and noise for numbers of every kind. */
 #include "door/door_measuring.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "measuring/philox.h"
 #include "measuring/reading.h"
 
-/* Known answers of Random123, kat_vectors: philox4x32 10. */
+/* Known answers of Random123 (kat_vectors, philox4x32 10). */
 static void test_philox(void)
 {
     static const uint32_t known[3][10] = {
@@ -34,7 +34,7 @@ static void test_gaussian(void)
     const int64_t last = (INT64_C(1) << 52) - 1;
     double before = vi_gaussian_quantile(-last - 1);
     CHECK(before > -8.4 && before < -8.2, "got %.17g", before);
-    for (int k = 1; k <= 1000; ++k) { /* never falls, in all three parts */
+    for (int k = 1; k <= 1000; ++k) { /* rises in all three parts */
         const double now = vi_gaussian_quantile(-last - 1 + (int64_t)ldexp(1.0, 52) / 500 * k);
         CHECK(now > before, "%.17g after %.17g at %d", now, before, k);
         before = now;
@@ -58,7 +58,7 @@ static vi_cell_settings any_settings(uint64_t *seed)
     return s;
 }
 
-/* What goes in is bounded, so is what is seen; after all half sines nothing of them is left. */
+/* Bounded forces and impulses give bounded outputs; after all half sines nothing of them is left. */
 static void test_any_cell(uint64_t *seed)
 {
     const vi_cell_settings settings = any_settings(seed);
@@ -83,12 +83,12 @@ static void test_any_cell(uint64_t *seed)
     CHECK(vi_cell_unused(&cell) == sizeof cell.pulses, "room is taken");
 }
 
-/* The queue of half sines fills, moves up, and refuses one too many. */
+/* The queue of half sines fills, moves up, and refuses one half sine too many. */
 static void test_the_queue(void)
 {
     const vi_cell_settings settings = {1.0, 100.0, 0.1, 0.0, 0.0, 1.0};
     vi_door_cell_start(&cell, &settings, 0.0, 0.0);
-    for (int k = 0; k < 3 * VI_CELL_PULSES; ++k) { /* never more than 1001 at once */
+    for (int k = 0; k < 3 * VI_CELL_PULSES; ++k) { /* at most 1001 at once */
         vi_cell_advance(&cell, 1e-3 * k, 0.0);
         CHECK(vi_cell_hit(&cell, 1e-3), "impact %d", k);
     }

@@ -1,4 +1,5 @@
-/* Modes of random chains, cut and graded at will, and of beams to high order: invariants that need no reference. */
+/* Modes of random chains, divided and graded at random, and of beams to high order: invariants that need no
+ * reference. */
 #include <math.h>
 
 #include "check.h"
@@ -29,7 +30,7 @@ static vi_chain random_chain(uint64_t *seed)
     return chain;
 }
 
-/* Groups of masses that no spring ties to the ground. */
+/* Number of groups of masses that no spring ties to the ground. */
 static int floating_groups(const vi_chain *chain)
 {
     int groups = 0;
@@ -57,8 +58,8 @@ static void check_orthonormal(const vi_chain *chain, const vi_chain_modes *modes
     }
 }
 
-/* With every spring but the far one: det(M^-1 K) = product of k_i / m_i, which the smallest frequencies show as well
- * as the largest. */
+/* Chains with every spring but the far one: det(M^-1 K) = product of k_i / m_i, which the smallest frequencies affect
+ * as much as the largest. */
 static void check_determinant(const vi_chain *chain, const vi_chain_modes *modes)
 {
     double sum = 0.0;
@@ -144,7 +145,7 @@ static void collocated_impulses_move_one_point(uint64_t *seed)
     for (int n = 0; n < 300; ++n) {
         const vi_beam_boundary boundary = (vi_beam_boundary)(1 + choice(seed, 4));
         const int points = 1 + (int)choice(seed, VI_MODES), at = (int)choice(seed, (unsigned)points);
-        for (int k = 0; k < points; ++k) { /* one in each of equal cells, clear of both ends */
+        for (int k = 0; k < points; ++k) { /* one point in each of equal cells, clear of both ends */
             grid[k] = (k + uniform(seed, 0.4, 0.6)) / points;
         }
         CHECK(vi_beam_collocation(boundary, points, grid, at, direction), "grid of %d points", points);
@@ -163,14 +164,14 @@ static void collocated_impulses_move_one_point(uint64_t *seed)
     CHECK(!vi_beam_collocation(VI_CLAMPED_FREE, VI_MODES + 1, grid, 0, direction), "%s", "too many points");
 }
 
-/* With its residual vectors a beam yields to static forces at the points as much as with all its modes. */
+/* With its residual vectors a beam yields to static forces at the points as with all its modes. */
 static void residual_vectors_make_the_flexibility_whole(uint64_t *seed)
 {
     for (int trial = 0; trial < 300; ++trial) {
         const vi_beam_boundary boundary = (vi_beam_boundary)(1 + choice(seed, 4));
         const int natural = 1 + (int)choice(seed, VI_MODES - 1), points = 1 + (int)choice(seed, VI_PORTS);
         double point[VI_PORTS];
-        for (int k = 0; k < points; ++k) { /* one in each of equal cells */
+        for (int k = 0; k < points; ++k) { /* one point in each of equal cells */
             point[k] = (k + uniform(seed, 0.3, 0.7)) / points;
         }
         if (choice(seed, 2) && boundary == VI_CLAMPED_FREE) {

@@ -1,5 +1,5 @@
-/* Random bodies of one mode between random stops under random steps and inputs: never beyond a stop, never back in time, never for
- * ever; a copy goes on bit for bit; a mirror image is a mirror image. */
+/* Random bodies of one mode between random stops under random steps and inputs. They are never beyond a stop, never go
+ * back in time, and always end their steps. A copy goes on bit for bit; a mirror image stays a mirror image. */
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/impact.h"
@@ -20,7 +20,7 @@ static const double GAPS[] = {1e-9, 1e-3, 0.4, 2.0};
 
 enum { STOPS = 2 };
 
-/* A mass-normalised body of one mode. `saved` is what a saved state holds; the rest follows from it. */
+/* A mass-normalised body of one mode. `saved` is the content of a saved state; the other members are caches. */
 typedef struct {
     struct {
         vi_structure_model model;
@@ -151,7 +151,7 @@ static void hold(body *b, double held, double rate)
     vi_structure_hold(&s, &held, &rate);
 }
 
-/* Another body hits this one: its momentum changes by the impulse, which is taken once. */
+/* Another body hits this one: the impulse changes its momentum exactly once. */
 static void strike(uint64_t *seed, int run)
 {
     const int k = (int)choice(seed, STOPS);
@@ -193,7 +193,7 @@ static void run_one(uint64_t *seed, int run)
         check_mirrored(&original, &image, run);
         CHECK(vi_clock_time(&original.saved.model.clock, original.saved.state.now) >= before, "run %d: back from %.17g",
               run, before);
-        copy.saved = before_step.saved; /* what is kept beside a state, of another body, makes no difference */
+        copy.saved = before_step.saved; /* other contents of the caches, from another body, make no difference */
         step(&copy, size, early);
         CHECK(memcmp(&copy.saved, &original.saved, sizeof copy.saved) == 0, "run %d: a copy goes another way", run);
     }
@@ -212,7 +212,7 @@ static void a_million_impacts_keep_their_phase(void)
     const vi_step_request request = {0.0, 1.0, false, false};
     const vi_structure s = parts(b);
     vi_structure_advance(&s, (vi_instant){1000000, 0.0, 0.0}, &request);
-    /* 40-digit closed form of P(1,1) */
+    /* closed form of P(1,1) to 40 digits */
     const double off = fabs(b->saved.contacts[0].last_phase - 0.3665212101960540571);
     CHECK(b->saved.contacts[0].count > 999990 && off <= 1e-13, "%lld impacts, phase off by %g",
           (long long)b->saved.contacts[0].count, off);

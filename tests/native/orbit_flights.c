@@ -1,5 +1,5 @@
-/* Flights and maxima of periodic orbits of random bodies against the flow that runs are made of: what the periodic response says of an impact,
- * a flight from the impact before must say as well. */
+/* Flights and maxima of periodic orbits of random bodies against the flow used for runs. A flight from one impact must
+ * reach the next impact as the periodic response predicts. */
 #include "door/orbits.h"
 
 #include <math.h>
@@ -74,7 +74,7 @@ static void draw(uint64_t *seed, orbit_case *drawn)
     }
 }
 
-/* Flies all modes from `state` at `phase` for u seconds, on the core's exact flow. */
+/* Fly all modes from `state` at `phase` for u seconds, on the core's exact flow. */
 static void fly(const vi_orbit_body *body, const double state[], double phase, double u, double end[])
 {
     for (int j = 0; j < body->modes; ++j) {
@@ -84,7 +84,7 @@ static void fly(const vi_orbit_body *body, const double state[], double phase, d
         vi_mode_start(&mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, hypot(c, s),
                       body->angular_frequency);
         double x = state[j], v = state[body->modes + j];
-        for (double done = 0.0; done < u;) { /* near a resonance segments are short */
+        for (double done = 0.0; done < u;) { /* segments are short near a resonance */
             vi_segment segment;
             vi_motion motion;
             vi_segment_start(&segment, &mode, x, v, vi_phase_of(angle + body->angular_frequency * done), body->held[j],
@@ -125,7 +125,7 @@ static double flight(const orbit_case *drawn, int i)
     return (to - from) / drawn->body.angular_frequency;
 }
 
-/* Each flight ends at the next impact as the train says: its distance, its velocity, and the state after it. */
+/* Each flight ends at the next impact with the predicted distance, velocity and state. */
 static void check_flights(const orbit_case *drawn, const double velocity[], const double distance[],
                           const double state[])
 {
@@ -151,7 +151,7 @@ static void check_flights(const orbit_case *drawn, const double velocity[], cons
     }
 }
 
-/* The reported maximum is one: the contact is there, at that phase. */
+/* The contact reaches the reported maximum at the reported phase. */
 static void check_attained(const orbit_case *drawn, const double state[], const double what[3])
 {
     const vi_orbit_body *body = &drawn->body;
@@ -167,7 +167,7 @@ static void check_attained(const orbit_case *drawn, const double state[], const 
     CHECK(fabs(beyond - what[0]) <= 1e-9 * (1.0 + fabs(what[0])), "%.17g at %g, not %.17g", beyond, what[1], what[0]);
 }
 
-/* An impact turns other contacts round as well: kinks of theirs, which are maxima. */
+/* An impact may reverse other contacts: these kinks are maxima. */
 static void check_kinks(const orbit_case *drawn, const double state[], double highest)
 {
     const vi_orbit_body *body = &drawn->body;
@@ -189,7 +189,8 @@ static void check_kinks(const orbit_case *drawn, const double state[], double hi
     }
 }
 
-/* No sample of any contact inside a flight is beyond the highest maximum, unless it is on its way to an impact. */
+/* No sample of any contact within a flight is beyond the highest maximum, unless the contact is on its way to an
+ * impact. */
 static void check_maximum(const orbit_case *drawn, const double state[])
 {
     const vi_orbit_body *body = &drawn->body;
@@ -229,7 +230,7 @@ static int check_random_orbits(uint64_t *seed, int count)
         const int end = vi_door_orbit(&drawn.body, &drawn.train, velocity, distance, slopes, faster);
         CHECK(end == VI_ORBIT_DONE, "case %d: %d", each, end);
         if (largest(velocity, drawn.train.impacts) > 1e3) {
-            continue; /* next to a resonance of an undamped mode */
+            continue; /* near a resonance of an undamped mode */
         }
         ++evaluated;
         CHECK(vi_door_orbit_motion(&drawn.body, &drawn.train, velocity, state, monodromy) == VI_ORBIT_DONE, "motion");
@@ -247,7 +248,7 @@ static int end_of(const orbit_case *drawn)
     return vi_door_orbit(&drawn->body, &drawn->train, numbers[0], numbers[1], slopes[0], slopes[1]);
 }
 
-/* An undamped mode that is back after the whole train adds up its impacts without bound, whatever the force does. */
+/* An undamped mode that returns after the whole train adds up its impacts without bound, for any force. */
 static void check_resonances(orbit_case *drawn)
 {
     for (int turns = 1; turns < 40; ++turns) {

@@ -1,4 +1,4 @@
-/* Periodic orbits of random bodies: the determinant of what impacts and flights make of a state, slopes, refusals. */
+/* Periodic orbits of random bodies: determinant of the monodromy matrix, slopes, refusals. */
 #include "door/orbits.h"
 
 #include <math.h>
@@ -111,7 +111,7 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants)
     for (int i = 0; i < s.train.impacts; ++i) {
         expected += 2.0 * log(s.restitution[s.contact[i]]);
         slowest = fmin(slowest, fabs(velocity[i]));
-        /* the state after an impact moves away at restitution times the speed before */
+        /* after an impact the contact moves away at restitution times the speed before */
         double speed = 0.0;
         for (int j = 0; j < modes; ++j) {
             speed += s.shape[s.contact[i] * modes + j] * state[i * 2 * modes + modes + j];

@@ -1,4 +1,4 @@
-/* Where a polynomial first falls to zero: against all its roots, placed by hand, and against a fine grid. */
+/* The first fall of a polynomial to zero, against its known roots and against a fine grid. */
 #include "motion/polynomial.h"
 
 #include <float.h>
@@ -15,7 +15,7 @@ static void times_root(double c[VI_ORDER + 1], int order, double root)
     }
 }
 
-/* A polynomial with these roots, positive at 0. */
+/* Make a polynomial with these roots, positive at 0. */
 static void from_roots(double c[VI_ORDER + 1], const double roots[], int count)
 {
     memset(c, 0, (VI_ORDER + 1) * sizeof c[0]);
@@ -28,7 +28,7 @@ static void from_roots(double c[VI_ORDER + 1], const double roots[], int count)
     }
 }
 
-/* The first of well separated roots is found, to the conditioning of the polynomial. */
+/* The first of well separated roots is found, within the conditioning of the polynomial. */
 static void the_first_root_is_found(uint64_t *seed)
 {
     double c[VI_ORDER + 1], roots[6];
@@ -58,7 +58,7 @@ static void the_first_root_is_found(uint64_t *seed)
     }
 }
 
-/* Nothing is passed, and what is found is a zero, in polynomials of any coefficients. */
+/* No fall is missed, and each fall found is a zero, for polynomials with any coefficients. */
 static void nothing_is_passed(uint64_t *seed)
 {
     double c[VI_ORDER + 1], value[4];
@@ -83,7 +83,7 @@ static void nothing_is_passed(uint64_t *seed)
     }
 }
 
-/* What is nothing but rounding neither stops the search nor takes for ever. */
+/* Values of rounding size neither stop the search nor prolong it without end. */
 static void rounding_is_passed_over(uint64_t *seed)
 {
     double c[VI_ORDER + 1];
@@ -98,7 +98,7 @@ static void rounding_is_passed_over(uint64_t *seed)
     }
 }
 
-/* Coefficients of sizes that differ by 100 decades and more: the search comes to the end, or to the zero, all the same. */
+/* With coefficients whose sizes differ by 100 decades and more the search still finds the zero or reaches the end. */
 static void sizes_do_not_stop_it(uint64_t *seed)
 {
     double c[VI_ORDER + 1];
@@ -109,7 +109,7 @@ static void sizes_do_not_stop_it(uint64_t *seed)
         c[0] = pow(10.0, uniform(seed, -200.0, -180.0));
         c[1] = pow(10.0, uniform(seed, -130.0, -100.0));
         c[high] = sign * pow(10.0, uniform(seed, -40.0, 0.0));
-        const double zero = pow(c[1] / fabs(c[high]), 1.0 / (double)(high - 1)); /* c[0] does not move it */
+        const double zero = pow(c[1] / fabs(c[high]), 1.0 / (double)(high - 1)); /* c[0] does not affect it */
         const vi_fall fall = vi_polynomial_fall(c, 0.0, length, DBL_EPSILON * c[0]);
         const bool falls = sign < 0.0 && zero < length;
         CHECK(fall.found == falls && (falls || fall.time == length), "run %d: ended at %g of %g", run, fall.time,

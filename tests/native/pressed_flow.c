@@ -1,5 +1,5 @@
-/* Long rests by their exact flow: the same motion as by series, force and impulse too; the same bits without the
- * modes that were kept; and the complex modes found for nearly all bodies, on one stop and on several, whatever damps them. */
+/* Long rests by their exact flow: the same motion, force and impulse as by series, and the same bits without the kept
+ * modes. Complex modes are found for nearly all bodies, on one stop and on several, for any damping. */
 #include "body/modal/pressed_flow.h"
 
 #include <math.h>
@@ -28,7 +28,7 @@ static vi_structure body_of(parts *it, vi_pressed *kept)
     return (vi_structure){&it->model, &it->state, it->contacts, &it->record, kept, NULL};
 }
 
-/* How the modes are damped. */
+/* Damping of the modes. */
 typedef enum { CLASSICAL, STRONG, COUPLED, DAMPINGS } damping_kind;
 
 static void set_stop(uint64_t *seed, int k, bool rigid)
@@ -52,7 +52,7 @@ static void set_stop(uint64_t *seed, int k, bool rigid)
     contact->law.damping = choice(seed, 3) == 0 ? 0.0 : uniform(seed, 0.0, 3.0) * sqrt(stiffness / mobility);
 }
 
-/* Dampers between points of the body. */
+/* Add dampers between points of the body. */
 static void couple(uint64_t *seed)
 {
     vi_structure_model *model = &one.model;
@@ -71,8 +71,8 @@ static void couple(uint64_t *seed)
     }
 }
 
-/* A body pressed to its stops by a load, at rest on them but for its modes; the first point is a node of one of them now
- * and then. */
+/* Make a body that a load presses to its stops, at rest on them except for its modes. Sometimes the first point is a
+ * node of a mode. */
 static vi_structure make(uint64_t *seed, int modes, int contacts, damping_kind kind)
 {
     vi_structure_model *model = &one.model;
@@ -113,7 +113,7 @@ static vi_step_result go(const vi_structure *s, double to)
     return vi_structure_advance(s, target, &request);
 }
 
-/* Follow the body by series, with the impulse of each contact; returns the time. */
+/* Follow the body by series, with the impulse of each contact; returns the time followed. */
 static double follow_by_series(const vi_structure *s, const vi_pressed_flow *flow, double impulse[])
 {
     static vi_drift drift;
@@ -168,7 +168,7 @@ static void check_against_series(const vi_structure *s, const vi_pressed *kept, 
         size = fmax(size, fabs(q[j]));
         speed = fmax(speed, fabs(p[j]) + fabs(s->state->p[j]));
     }
-    /* stops turn roundings of displacements into velocities at their own rate */
+    /* stops turn the rounding of displacements into velocities at their own rate */
     const double rounding = 1e-14 * fastest_rate(kept) * size;
     for (int j = 0; j < s->model->modes; ++j) {
         CHECK(fabs(end_q[j] - q[j]) <= 1e-11 * (size + speed)
@@ -183,7 +183,7 @@ static void check_against_series(const vi_structure *s, const vi_pressed *kept, 
     }
 }
 
-/* What the body keeps of its modes is no part of its state. */
+/* The modes kept by a body are no part of its state. */
 static void check_copy(const vi_structure *s, double time, int run)
 {
     other = one;
@@ -194,7 +194,7 @@ static void check_copy(const vi_structure *s, double time, int run)
     CHECK(memcmp(&one.state, &other.state, sizeof one.state) == 0, "run %d: a copy goes on otherwise", run);
 }
 
-/* Every contact pressed, so that what is compared is the rest alone. */
+/* Is every contact pressed, so that only the rest is compared? */
 static int all_rest(void)
 {
     for (int k = 0; k < one.model.contacts; ++k) {

@@ -1,4 +1,4 @@
-/* The record: what an importer takes, what it forgets to take, and what it claims to have taken. */
+/* The record: rows that an importer takes, forgets to take, or wrongly claims to have taken. */
 #include "body/record.h"
 
 #include <math.h>

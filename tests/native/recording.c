@@ -1,4 +1,4 @@
-/* A recording: damaged files are told and leak nothing, and what is played is what a search from the front finds. */
+/* A recording: damaged files give a message and leak nothing; neighbours of a sample equal those of a plain search. */
 #define _POSIX_C_SOURCE 200809L
 #include "../../fmus/native/adapters/resources.c"
 #include "../../fmus/native/replay/player.c"
@@ -10,7 +10,7 @@
 
 enum { SAMPLES = 40 };
 
-static const char *folder; /* of resources: beside this program */
+static const char *folder; /* of resources, next to this program */
 
 static void write_file(const char *name, const void *bytes, size_t size)
 {
@@ -28,7 +28,7 @@ static void write_list(const char *text)
 
 static const char GOOD[] = "vibroimpact signals 2\naxis even 40\naxis listed 40\nchannel a 1\nchannel b 2\n";
 
-/* Samples of which each is missing with this probability, but one; and instants that ascend. */
+/* Write samples, each missing with this probability, but at least one with a value; and instants that ascend. */
 static void write_numbers(uint64_t *seed, double missing)
 {
     double values[SAMPLES], times[SAMPLES];
@@ -44,7 +44,7 @@ static void write_numbers(uint64_t *seed, double missing)
     write_file("channel_b.f64", values, sizeof values);
 }
 
-/* The same by searching from the front and from the back. */
+/* The neighbours, by a search from the sample in both directions. */
 static vi_neighbours searched(const vi_signal *signal, int64_t index, int64_t count)
 {
     vi_neighbours found = {index, index + 1};

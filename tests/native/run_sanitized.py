@@ -1,7 +1,7 @@
-"""Runs every C test of this folder under the sanitizers that the compiler at hand supports.
+"""Run every C test of this folder under the sanitizers that the compiler supports.
 
-Each `*.c` here is a program of its own, linked with the whole core; it passes when it exits with 0. Objects and
-programs are kept by the content of their sources, of all headers and of the compiler; programs run each time.
+Each `*.c` is a program, linked with the whole core; it passes when it exits with 0. Objects and programs are cached
+by the content of their sources, all headers and the compiler. All programs run each time.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ HERE = Path(__file__).resolve().parent
 KEPT = ROOT / "build" / "sanitized"
 SANITIZERS = ("address", "undefined")
 PROBE = "int main(int count, char **names) { (void)names; return count - 1; }\n"
-#: Tests that run for the longest, and begin first.
+#: Tests with the longest run times; they start first.
 LONGEST = ("one_mode.c", "budget.c", "pressed_flow.c")
-#: Longest that one test may take under the sanitizers, s.
+#: Longest run time of one test under the sanitizers, s; a longer test fails.
 LIMIT = 600.0
-#: Tests of bodies of one mode, which run on a core that is compiled for them, as the Oscillator's is.
+#: Tests of bodies of one mode; they run on a core compiled for one mode, like the Oscillator's.
 OF_ONE_MODE = ("one_mode.c",)
 ONE_MODE = ("-DVI_MODES=2", "-DVI_PORTS=2", "-DVI_ONLY_MODES=1")
 ENVIRONMENT = {**os.environ, "UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=1"}
@@ -48,12 +48,12 @@ class Toolchain:
 
     @cached_property
     def key(self) -> str:
-        """Digest of all that decides about an object but its source."""
+        """Digest of everything that affects an object, except its source."""
         headers = [*NATIVE.rglob("*.h"), *HERE.glob("*.h"), *fmi_headers().glob("*.h")]
         return digest(compiler_identity(self.compiler), *self.options, content_of(headers))
 
     def compile(self, *arguments: str | Path) -> None:
-        """Run the compiler; a CalledProcessError has its words."""
+        """Run the compiler; a CalledProcessError holds its messages."""
         command = [*self.compiler, *self.options, *map(str, arguments)]
         subprocess.run(command, check=True, capture_output=True, text=True)
 
@@ -80,7 +80,7 @@ def supported(compiler: Sequence[str], sanitizers: Sequence[str]) -> bool:
 
 
 def supported_sanitizers(compiler: Sequence[str]) -> tuple[str, ...]:
-    """Return the sanitizers that work here; say of the others that they do not."""
+    """Return the sanitizers that work here; print a line for each of the others."""
     if supported(compiler, SANITIZERS):
         return SANITIZERS
     found = tuple(sanitizer for sanitizer in SANITIZERS if supported(compiler, [sanitizer]))
@@ -90,7 +90,7 @@ def supported_sanitizers(compiler: Sequence[str]) -> tuple[str, ...]:
 
 
 def options_for(sanitizers: Sequence[str]) -> tuple[str, ...]:
-    """Return the options that the core and the tests are compiled with."""
+    """Return the compiler options for the core and the tests."""
     options = [*LANGUAGE, *WARNINGS, "-Werror", "-g1", "-O1"]
     options += [f"-I{folder}" for folder in (NATIVE / "core", NATIVE / "adapters", fmi_headers())]
     if sanitizers:
@@ -99,7 +99,7 @@ def options_for(sanitizers: Sequence[str]) -> tuple[str, ...]:
 
 
 def core_sources(of_one_mode: bool) -> list[Path]:
-    """Return the sources of the core; for one mode, those that the Oscillator has."""
+    """Return the sources of the core; for one mode, only the Oscillator's."""
     oscillator = read_component(NATIVE / "oscillator" / "variables.toml")
     core = NATIVE / "core"
     return [
@@ -110,7 +110,7 @@ def core_sources(of_one_mode: bool) -> list[Path]:
 
 
 def run(program: Path, name: str) -> None:
-    """Run a program; it finds itself in a folder of its own, where it may write."""
+    """Run a program in a folder of its own, in which it may write."""
     with tempfile.TemporaryDirectory() as folder:
         itself = str(Path(folder, name))
         subprocess.run(
@@ -126,7 +126,7 @@ def run(program: Path, name: str) -> None:
 
 
 def failure(test: Path, tools: Toolchain, core: Sequence[Path]) -> str:
-    """Compile and run one test; return what went wrong, empty where it passed."""
+    """Compile and run one test; return the error message, empty if the test passed."""
     try:
         run(tools.program_of(test, core), test.stem)
     except subprocess.CalledProcessError as error:
@@ -145,12 +145,12 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def in_order(tests: Iterable[Path]) -> list[Path]:
-    """Return the tests in the order in which they begin: the longest first, then by name."""
+    """Return the tests in their starting order: the longest first, then by name."""
     return sorted(tests, key=lambda test: (test.name not in LONGEST, test.name))
 
 
 def run_all(pool: ThreadPoolExecutor, compiler: tuple[str, ...], sanitizers: Sequence[str]) -> list[str]:
-    """Compile and run all tests, a line for each as it ends; return the names of those that failed."""
+    """Compile and run all tests, print a line for each; return the names of failed tests."""
     options, failed = options_for(sanitizers), []
     tools = {False: Toolchain(compiler, options), True: Toolchain(compiler, (*options, *ONE_MODE))}
     objects = {kind: pool.map(tools[kind].object_of, core_sources(kind)) for kind in tools}
@@ -168,7 +168,7 @@ def run_all(pool: ThreadPoolExecutor, compiler: tuple[str, ...], sanitizers: Seq
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run all; return 1 if one failed, or the core does not compile."""
+    """Run all tests; return 1 if a test failed or the core does not compile."""
     compiler = find_compiler()
     with ThreadPoolExecutor(parsed(arguments).jobs) as pool:
         try:

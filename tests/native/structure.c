@@ -1,5 +1,5 @@
-/* Random bodies of up to 64 modes with up to eight stops of every law, extreme ones too: finite, never beyond a rigid
- * stop, never back in time, never for ever; stops only push. */
+/* Random bodies of up to 64 modes with up to eight stops of every law, including extreme ones. They stay finite, are
+ * never beyond a rigid stop, never go back in time, and always end their steps. Stops only push. */
 #include "body/modal/modal_scan.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/structure.h"
@@ -50,7 +50,8 @@ static void make_modes(uint64_t *seed, double root)
 static void make_stop(uint64_t *seed, int k, double mass, double root)
 {
     vi_contact *contact = &contacts[k];
-    const bool twin = k > 0 && choice(seed, 8) == 0; /* the same point again: redundant, or the other end of a gap */
+    const bool twin = k > 0 && choice(seed, 8) == 0; /* same point as the stop before: redundant, or the other end of a
+                                                      * gap */
     double displacement = 0.0;
     for (int j = 0; j < model.modes; ++j) {
         const double own = uniform(seed, -1.0, 1.0) / root;
@@ -89,7 +90,7 @@ static void make(uint64_t *seed)
     vi_structure_start(&body, (vi_instant){0, 0.0, 0.0});
 }
 
-/* Largest rate of the body with all its stops pressed: a coupled motion is followed in pieces of about 1 / rate. */
+/* Largest rate of the body with all its stops pressed; a coupled motion is followed in pieces of about 1 / rate. */
 static double fastest_rate(void)
 {
     double rate = model.fastest;
@@ -124,7 +125,7 @@ static void check_state(int run)
     CHECK(isfinite(state.energies.contact_loss) && isfinite(state.energies.damping_loss), "run %d", run);
 }
 
-/* One event more at an instant that has seen many: a mass between two stops is thrown off the second. */
+/* One event too many at an instant: a mass between two stops is thrown off the second stop. */
 static void one_event_too_many_is_said(void)
 {
     uint64_t seed = 1;
@@ -158,7 +159,7 @@ static void one_event_too_many_is_said(void)
     CHECK(strstr(message, "1000 events at ") != NULL, "%s", message);
 }
 
-/* Another body hits a point: it gets the impulse over its contact mass, once. */
+/* Another body hits a point: the point gets the impulse over its contact mass exactly once. */
 static void strike(uint64_t *seed, int run)
 {
     const int k = (int)choice(seed, (unsigned)model.contacts);
@@ -182,7 +183,7 @@ int main(int count, char **names)
     one_event_too_many_is_said();
     uint64_t seed = 4;
     int64_t impacts = 0;
-    const int only = count > 1 ? atoi(names[1]) : -1; /* a run to look at by itself */
+    const int only = count > 1 ? atoi(names[1]) : -1; /* a single run to examine */
     for (int run = 0; run < RUNS; ++run) {
         uint64_t own = next_random(&seed);
         if (only >= 0 && run != only) {
@@ -190,7 +191,7 @@ int main(int count, char **names)
         }
         make(&own);
         if (vi_structure_beyond(&body) != 0) {
-            continue; /* two stops from either side of a point, started between them by rounding only */
+            continue; /* two stops from either side of a point, with a start between them only within rounding */
         }
         for (int n = 0; n < 6; ++n) {
             if (model.contacts > 0 && n % 3 == 1) {

@@ -1,4 +1,4 @@
-"""The runner of the C tests: what fails is said, and nothing is compiled a second time that is the same."""
+"""The runner of the C tests: it reports failures, and never compiles the same program twice."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TEST = '#include "twice.h"\nint main(void) { return twice(2) - %d; }\n'
 
 @pytest.fixture
 def native(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with a core of one function, and two tests of it, one of which fails."""
+    """Return a folder with a core of one function and two tests, one of them failing."""
     core, tests = tmp_path / "fmus" / "core", tmp_path / "tests"
     for folder in (core, tests, core.parent / "adapters"):
         folder.mkdir(parents=True)
@@ -28,13 +28,13 @@ def native(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(run_sanitized, "HERE", tests)
     monkeypatch.setattr(run_sanitized, "KEPT", tmp_path / "kept")
     monkeypatch.setattr(run_sanitized, "core_sources", lambda of_one_mode: [core / "twice.c"])
-    # that a compiler has sanitizers is not asked here
+    # no compiler is asked for its sanitizers here
     monkeypatch.setattr(run_sanitized, "supported", lambda compiler, sanitizers: False)
     return tmp_path
 
 
 def compiled(native: Path) -> dict[str, int]:
-    """Return what is kept, and which file it is."""
+    """Return the inode of each cached file by its name."""
     return {path.name: path.stat().st_ino for path in (native / "kept").iterdir()}
 
 
@@ -51,7 +51,7 @@ def test_a_program_that_fails_ends_the_run_with_1_and_what_is_the_same_is_not_co
     assert len(second.items() - first.items()) == 1
     (native / "fmus" / "core" / "twice.h").write_text(f"{HEADER}/* edited */\n")
     assert run_sanitized.main([]) == 0
-    # both programs, and the object for either kind of core
+    # both programs, and an object for each kind of core
     assert len(compiled(native).items() - second.items()) == 4
 
 

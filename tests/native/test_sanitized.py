@@ -1,4 +1,4 @@
-"""The C tests under the sanitizers, beside all other tests: `make sanitize` runs the same alone."""
+"""The C tests under the sanitizers, as part of all tests; `make sanitize` runs them alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def test_every_c_test_passes_under_the_sanitizers() -> None:
-    # one at a time: the other processors have tests of their own
+    # one at a time, since other tests use the other processors
     command = [sys.executable, str(Path(__file__).with_name("run_sanitized.py")), "--jobs", "1"]
     done = subprocess.run(command, capture_output=True, text=True)
     print(done.stdout)

@@ -1,8 +1,7 @@
 /* FMI 2.0 over vi_this_component. Co-simulation of FMI 2.0 has no event mode: see event_time in the model description.
  *
- * A step that ends early (a full record, impact_limit) cannot be said without fmi2Discard, after which no stock
- * importer continues; so steps never end early here, rows beyond the record are counted as dropped, and reaching
- * impact_limit is an error.
+ * Only fmi2Discard could announce a step that ends early (a full record, impact_limit), and no stock importer continues
+ * after it. So no step ends early here: rows beyond the record count as dropped, and reaching impact_limit is an error.
  */
 #include "fmi2Functions.h"
 
@@ -39,7 +38,7 @@ static void log_message(const vi_instance *instance, int level, const char *cate
     }
 }
 
-/* ---- life ---- */
+/* ---- instances ---- */
 
 const char *fmi2GetTypesPlatform(void)
 {
@@ -185,7 +184,7 @@ fmi2Status fmi2CancelStep(fmi2Component c)
     return unavailable(c, "fmi2CancelStep");
 }
 
-/* doStep is never asynchronous and never discarded: there is no status to ask for but the time and the end. */
+/* doStep is never asynchronous and never discarded, so only the time and the end can be queried. */
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
 {
     if (c == NULL || value == NULL || s != fmi2DoStepStatus) {
@@ -226,7 +225,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
 
 /* ---- variables ---- */
 
-/* FMI 2.0 integers have 32 bits: larger counts are shown as the largest. */
+/* FMI 2.0 integers have 32 bits: larger counts become the largest integer. */
 static void read_integer(void *field, void *values, size_t first, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {

@@ -26,7 +26,7 @@ static void log_message(const vi_instance *instance, int level, const char *cate
     }
 }
 
-/* ---- life ---- */
+/* ---- instances ---- */
 
 const char *fmi3GetVersion(void)
 {
@@ -53,7 +53,7 @@ static void refuse(fmi3LogMessageCallback log, fmi3InstanceEnvironment environme
     }
 }
 
-/* An instance with the sizes and start values of its description; NULL after logging. */
+/* Make an instance with the sizes and start values of its description; NULL after logging. */
 static vi_instance *instantiate(const char *function, fmi3String name, fmi3String token, fmi3String folder,
                                 fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {
@@ -92,8 +92,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
     static const char function[] = "fmi3InstantiateCoSimulation";
-    /* FMI lets an importer require only variables that are described as intermediate, which none of ours is; some
-     * require all they record. The callback is never called, and all values are there at the end of a step. */
+    /* FMI lets an importer require only variables described as intermediate, and this component has none; yet some
+     * require all variables they record. The callback is never called; all values are there at the end of a step. */
     vi_instance *instance = instantiate(function, instanceName, instantiationToken, resourcePath, loggingOn,
                                         instanceEnvironment, logMessage);
     if (instance != NULL) {
@@ -156,7 +156,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     return fmi3OK;
 }
 
-/* A law that another FMU answers needs an importer that stops at events. */
+/* Does the importer stop at events? A law that another FMU answers needs it. */
 static bool events_are_handled(vi_instance *it, const char *function)
 {
     const bool needed = vi_this_component.needs_events != NULL && vi_this_component.needs_events(it->self);
@@ -238,7 +238,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     it->outputs_stale = false;
     const double end = currentCommunicationPoint + communicationStepSize;
-    const double reached = vi_instance_time(it); /* a contact may lie within rounding after the end */
+    const double reached = vi_instance_time(it); /* rounding may put a contact after the end */
     *lastSuccessfulTime = result == VI_STEP_DONE || reached > end ? end : reached;
     if (result == VI_STEP_IMPACT_LIMIT) {
         log_message(it, fmi3Discard, "logStatusWarning", "fmi3DoStep: impact_limit reached");

@@ -1,4 +1,4 @@
-/* What else FMI 3.0 declares: importers look all of it up, so that it is exported and says that it is not available. */
+/* The remaining functions of FMI 3.0: importers look them up, so each is exported and answers "not available". */
 #include "fmi3Functions.h"
 
 #include "instance.h"
@@ -15,7 +15,7 @@ static fmi3Status unavailable(fmi3Instance instance, const char *function)
     return fmi3Error;
 }
 
-/* ---- types that no variable of ours has: every reference is refused, asking for none is fine ---- */
+/* ---- types that no variable here has: every reference is refused, an empty request is fine ---- */
 
 #define EMPTY_TYPE(NAME, CTYPE)                                                                                     \
     fmi3Status fmi3Get##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \

@@ -12,17 +12,17 @@
 static const vi_component *const component = &vi_this_component;
 static const vi_description *const description = &vi_this_description;
 
-/* Largest amount by which a step may pass the stop time: the rounding of an importer's sums, relative to 1 + |time|. */
+/* Largest time by which a step may pass the stop time, relative to 1 + |time|: the rounding of an importer's sums. */
 #define STOP_ROUNDING 1e-9
 
-/* States of a body: a displacement and a velocity of each mode. */
+/* Most states of a body: a displacement and a velocity of each mode. */
 enum { MOST_STATES = 2 * VI_MODES };
 
-/* ---- life ---- */
+/* ---- instances ---- */
 
 bool vi_token_fits(const char *token)
 {
-    static const char own[] = "000000000000}"; /* as many characters as are an export's own */
+    static const char own[] = "000000000000}"; /* length of an export's own part */
     const size_t length = strlen(description->token);
     return token != NULL && strlen(token) == length && length >= sizeof own - 1
            && strncmp(token, description->token, length - (sizeof own - 1)) == 0;
@@ -73,7 +73,7 @@ static void announce(vi_instance *instance, uint32_t reference)
     }
 }
 
-/* Starts of other variables than those that may be set, or of arrays, are no start values. */
+/* Put a start value. Variables that may not be set, and arrays, have no start values. */
 static void put_start(vi_instance *instance, const vi_start *start)
 {
     const vi_variable *variable =
@@ -114,7 +114,7 @@ void vi_instance_reset(vi_instance *instance)
     instance->stop_time = HUGE_VAL;
 }
 
-enum { LEVEL_WARNING = 1, LEVEL_ERROR = 3 }; /* in both versions of FMI */
+enum { LEVEL_WARNING = 1, LEVEL_ERROR = 3 }; /* levels of both versions of FMI */
 
 static void report(const vi_instance *instance, int level, const char *category, const char *function,
                    const char *format, va_list arguments)
@@ -324,7 +324,7 @@ bool vi_instance_get(vi_instance *instance, const char *function, int type, cons
     return all_values_used(instance, function, first, value_count);
 }
 
-/* A state may be set one by one where all may be set at once: there are tools that make a Jacobian so. */
+/* May single states be set? They may where all states may: some tools build a Jacobian this way. */
 static bool may_set_states(const vi_instance *instance)
 {
     return instance->exchange && instance->mode == VI_MODE_CONTINUOUS;
@@ -346,7 +346,7 @@ static bool may_set(vi_instance *instance, const char *function, const vi_variab
     return true;
 }
 
-/* Place of a state among those that the description has: of both halves perhaps fewer than were compiled in. */
+/* Place of a state in the description, whose two halves may be shorter than those compiled in. */
 static size_t place_of_state(const vi_instance *instance, uint32_t own)
 {
     const size_t most = description->state_count / 2, described = component->exchange->states(instance->self) / 2;

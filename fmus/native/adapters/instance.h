@@ -1,4 +1,4 @@
-/* What the FMI 3.0 and the FMI 2.0 adapter share: an instance, its mode, its variables. */
+/* Instances, for both versions of FMI: their mode, their variables, their steps. */
 #ifndef VIBROIMPACT_INSTANCE_H
 #define VIBROIMPACT_INSTANCE_H
 
@@ -28,12 +28,12 @@ enum {
 typedef struct vi_instance vi_instance;
 
 struct vi_instance {
-    void *self;            /* the component's struct, with its record; the first member of nothing */
+    void *self;            /* the component's struct, with its record */
     vi_mode_of_use mode;
     bool outputs_stale;    /* an input was set since the outputs were computed */
     bool event_mode_used, early_return_allowed, logging;
-    bool exchange;         /* made for model exchange: the importer integrates it */
-    double start_time, stop_time; /* stop_time: infinite where the importer defines none */
+    bool exchange;         /* made for model exchange: the importer integrates the component */
+    double start_time, stop_time; /* stop_time: infinite if the importer defines none */
     char *name;
     char message[VI_MESSAGE_LENGTH];
     /* version-specific logger: level 0 event, 1 warning, 3 error */
@@ -41,62 +41,62 @@ struct vi_instance {
     void *environment;
     void (*callback)(void);
     vi_sizes sizes;          /* of the description */
-    vi_start *starts;        /* of the description, where they are not the component's own */
+    vi_start *starts;        /* start values of the description that differ from the component's */
     size_t start_count;
-    uint32_t *references;    /* the component's, of the description's 1, 2, ...; NULL: they are the same */
+    uint32_t *references;    /* the component's references for 1, 2, ... of the description; NULL: the same */
     size_t reference_count;
-    void *resources;         /* what the component has opened; NULL for most */
+    void *resources;         /* resources opened by the component; NULL for most components */
 };
 
-/* Is a token this component's? Its last twelve digits are an export's own: two exports are two FMUs to any tool. */
+/* Is this token the component's? Its last twelve digits are an export's own, so exports are different FMUs. */
 bool vi_token_fits(const char *token);
 
-/* NULL when memory is out. */
+/* A new instance; NULL when memory is out. */
 vi_instance *vi_instance_new(const char *name);
 void vi_instance_free(vi_instance *instance);
 void vi_instance_reset(vi_instance *instance);
 
 /* Take sizes and start values of the description from the folder of resources, now and after each reset; NULL: the
- * component's own. `numbered`: the description of an export's token has value references of its own, which must be
- * there. Return false, after logging, when they are not, memory is out or the component cannot use its resources. */
+ * component's own. `numbered`: the description of an export's token has its own value references, which must be there.
+ * Returns false, after logging, when they are missing, memory is out or the component cannot use its resources. */
 bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder, bool numbered);
 
-/* Is a token that fits an export's? */
+/* Is this token, which fits, an export's? */
 bool vi_token_is_of_export(const char *token);
 
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
 void vi_instance_warn(const vi_instance *instance, const char *function, const char *format, ...);
 
-/* Begin at `start` with this stop time, infinite where there is none; false after logging where it lies before `start`. */
+/* Set start and stop time (infinite: none). Returns false, after logging, when the stop time lies before `start`. */
 bool vi_instance_set_experiment(vi_instance *instance, const char *function, double start, double stop);
 
-/* Does a step from `time` by `size` end by the stop time, to rounding? If not, log it. */
+/* Does a step from `time` by `size` end by the stop time, within rounding? If not, log it. */
 bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size);
 
-/* Is there an instance, and in one of these modes? If not, log it. */
+/* Is there an instance in one of these modes? If not, log it. */
 bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 
-/* From one of these modes into another. */
+/* Change the mode from one of these modes to another. */
 bool vi_instance_enter(vi_instance *instance, const char *function, int from, vi_mode_of_use to);
 
-/* Initialization's end: false (with the component's message logged) when a parameter is bad. Logs its warning. */
+/* End initialization: false, after logging the component's message, when a parameter is bad. Warnings are logged. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
 
 /* Present time, s. */
 double vi_instance_time(const vi_instance *instance);
 
-/* Advance the component; what is wrong with the step is in `message`. */
+/* Advance the component; `message` holds the problem of a step that failed. */
 vi_step_result vi_instance_step(vi_instance *instance, const vi_step_request *request);
 
-/* False, after logging, for an instance of model exchange. */
+/* Is this an instance of co-simulation? If not, log it. */
 bool vi_instance_expect_steps(vi_instance *instance, const char *function);
 
-/* Recompute the outputs if something was set since: in initialization mode, where the motion starts anew. */
+/* Recompute the outputs if a variable was set since; in initialization mode the motion starts anew. */
 void vi_instance_refresh(vi_instance *instance);
 
-/* Get and set `n` variables of one type. `convert` moves one variable's `count` elements between the struct and the
- * importer's array, which is advanced by the caller's type. Return false after logging. */
+/* Get and set `n` variables of one type. `convert` moves the `count` elements of one variable between the struct and
+ * the importer's array, from element `first` on. Return false after logging. */
 typedef void (*vi_convert)(void *field, void *values, size_t first, size_t count);
 bool vi_instance_get(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      void *values, size_t value_count, vi_convert convert);

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* Where a component has no states, nothing is called but `set_time`. */
+/* Does the component have states? If not, only its `set_time` is called. */
 static bool has_states(void)
 {
     return vi_this_component.exchange->states != NULL;
@@ -112,7 +112,7 @@ bool vi_instance_set_states(vi_instance *instance, const char *function, const d
     return true;
 }
 
-/* States and nominal values are as they are; what is computed from the states has to be finite. */
+/* Are the states and all values computed from them finite? If not, warn. */
 static bool is_finite(vi_instance *instance, const char *function, const double values[], size_t count)
 {
     bool finite = vi_this_component.exchange->states_are_finite(instance->self);

@@ -9,7 +9,7 @@
 #include <windows.h>
 #endif
 
-/* The path is UTF-8 in FMI. */
+/* Paths are UTF-8 in FMI. */
 static FILE *open_to_read(const char *path)
 {
 #if defined(_WIN32)
@@ -64,7 +64,7 @@ size_t vi_references_read(const char *folder, uint32_t references[], size_t most
         return 0;
     }
     size_t count = 0;
-    while (count < most && fscanf(file, "%9" SCNu32, &references[count]) == 1) { /* the width is that of a number */
+    while (count < most && fscanf(file, "%9" SCNu32, &references[count]) == 1) { /* the width of a number */
         count += 1;
     }
     (void)fclose(file);
@@ -101,7 +101,7 @@ static const char *path_of(const char *uri)
         return NULL;
     }
     const char *path = uri + sizeof scheme - 1;
-    if (strncmp(path, "//", 2) == 0) { /* the host, empty or this machine, is passed over */
+    if (strncmp(path, "//", 2) == 0) { /* skip the host, empty or this machine */
         path = strchr(path + 2, '/');
     }
 #if defined(_WIN32)

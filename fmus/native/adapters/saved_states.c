@@ -18,7 +18,7 @@ static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '1'};
 
 static const uint64_t HASH_START = 1469598103934665603u;
 
-/* FNV-1a: tells a damaged or foreign state from a good one; not a defence against forgery. */
+/* FNV-1a hash: detects a damaged or foreign state, but no forgery. */
 static uint64_t hash(uint64_t h, const void *data, size_t size)
 {
     const unsigned char *bytes = data;
@@ -39,7 +39,7 @@ static size_t used_size(const vi_instance *instance)
     return whole ? vi_this_description.struct_size : vi_this_component.used_size(instance->self);
 }
 
-/* Of all that a state says: the header from `size` on, and the data. */
+/* Hash of everything in a state: the header from `size` on, and the data. */
 static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
 {
     const size_t first = offsetof(vi_saved, size);

@@ -1,21 +1,21 @@
-/* Saved states of an instance, also as bytes. Both versions of FMI call these functions with what they were given: NULL
- * where something is missing is false, without a word. */
+/* Saved states of an instance, also as bytes. Arguments come unchecked from FMI: NULL gives false, without a
+ * message. */
 #ifndef VIBROIMPACT_SAVED_STATES_H
 #define VIBROIMPACT_SAVED_STATES_H
 
 #include "instance.h"
 
-/* Save into *state (reused when large enough, else allocated); false when memory is out. */
+/* Save into *state (reused when large enough, otherwise allocated); false when memory is out. */
 bool vi_state_save(vi_instance *instance, const char *function, void **state);
 bool vi_state_restore(vi_instance *instance, const char *function, const void *state);
-/* True, also where there is none; it is NULL afterwards. */
+/* Free the state, if there is one, and set it to NULL; returns true. */
 bool vi_state_free(void **state);
 
-/* How many bytes it takes. */
+/* Number of bytes of a state. */
 bool vi_state_size(const vi_instance *instance, const void *state, size_t *size);
-/* False where the bytes have no room for it. */
+/* Write a state as bytes; false when there is too little room. */
 bool vi_state_write(const vi_instance *instance, const void *state, unsigned char *bytes, size_t size);
-/* *state: a new one from bytes; false (after logging) when they are not a state of this component. */
+/* Make a new *state from bytes; false, after logging, when they are no state of this component. */
 bool vi_state_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size, void **state);
 
 #endif

@@ -15,7 +15,7 @@ static void defaults(void *self)
     it->event_time = NAN;
 }
 
-/* What is held does not follow the input: a sample is taken where an edge is. */
+/* The output does not follow the input: samples are taken at edges. */
 static void update_outputs(void *self)
 {
     (void)self;
@@ -42,7 +42,7 @@ static void check_parameters(const analog_input *it, char *message)
     }
 }
 
-/* Before the first edge the start value is held, rounded as all are. */
+/* Before the first edge the output is the start value, rounded like all samples. */
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     analog_input *it = self;
@@ -72,7 +72,7 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
-/* With event mode a step ends at an edge, where the input is set anew; else edges of a step sample the input that it has. */
+/* With event mode a step ends at an edge, where the input is set anew; otherwise edges in a step sample its input. */
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     analog_input *it = self;

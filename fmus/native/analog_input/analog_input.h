@@ -6,7 +6,7 @@
 
 #include "measuring/converter.h"
 
-/* All of an AnalogInput's variables (variables.toml says what each is). */
+/* All variables of an AnalogInput, described in variables.toml. */
 typedef struct {
     double time;
     vi_sample_clock clock;
@@ -16,8 +16,8 @@ typedef struct {
     double output;
     int64_t sample;
     double event_time;
-    int64_t next;    /* edge that comes */
-    int32_t pending; /* an edge is here, and event mode has not sampled it */
+    int64_t next;    /* next edge */
+    int32_t pending; /* an edge is reached but not yet sampled in event mode */
 } analog_input;
 
 #endif

@@ -7,13 +7,13 @@
 #include "beam_variables.h"
 #include "modes/beam_modes.h"
 
-enum { START_MODES = 4 };
+enum { START_MODES = 4 }; /* default number of modes */
 
-/* Estimated relative error of a natural frequency above which the theory is left. equations.md 6.7 */
+/* Estimated relative error of a natural frequency above which the beam warns. equations.md 6.7 */
 static const double VALIDITY_LIMIT = 0.02;
 /* Shear coefficient of a rectangular section. */
 static const double SHEAR_COEFFICIENT = 5.0 / 6.0;
-/* A point whose contact mass is more than this many beam masses is a support: no stop can be met there. */
+/* Contact mass of a point, in beam masses, above which the point is a support and can meet no stop. */
 static const double HEAVIEST_POINT = 1e20;
 
 static void defaults(void *self)
@@ -64,7 +64,7 @@ static void check_location(char *message, const char *name, double value)
     }
 }
 
-/* Of the section only what is used has to be right. */
+/* Check the used parameters of the section. */
 static void check_section(const beam *b, char *message)
 {
     vi_check_positive(message, "length", b->length);
@@ -140,13 +140,13 @@ static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
     vi_check_finite(message, "force_rate", b->force_rate);
 }
 
-/* Is there a stop whose force acts on the beam? Pairs are not known before the importer says what they are. */
+/* Can a stop act at contact k? Law `pair` counts: the importer says only later how a pair acts. */
 static bool has_stop(const beam *b, int k)
 {
     return !vi_contact_law_is_none(b->body.contacts[k].law.law);
 }
 
-/* A residual vector has its full mass; a rigid stop would meet that of all modes beyond, which is none. */
+/* A residual vector has its full mass. A rigid stop would need the mass of all modes beyond, which is 0. */
 static void check_residual(const beam *b, char *message)
 {
     for (int k = 0; b->residual && k < VI_PORTS; ++k) {
@@ -189,7 +189,7 @@ static double linear_density(const beam *b)
     return b->mass_per_length > 0.0 ? b->mass_per_length : b->density * b->width * b->thickness;
 }
 
-/* Modes that are natural ones; residual vectors come after them. */
+/* Number of natural modes; residual vectors come after them. */
 static int natural_modes(const beam *b)
 {
     return (int)b->modes - b->dropped.points;
@@ -234,7 +234,7 @@ static bool on_support(const beam *b, double location)
     return (location == 0.0) || (location == 1.0 && b->boundary != VI_CLAMPED_FREE);
 }
 
-/* One residual vector for each place that has a stop. */
+/* Find one residual vector for each place with a stop. */
 static void find_residual(beam *b, char *message)
 {
     double place[VI_PORTS];
@@ -266,7 +266,7 @@ static void find_residual(beam *b, char *message)
     }
 }
 
-/* N kg^(-1/2). equations.md 6.5 */
+/* Force on mode j, N kg^(-1/2). equations.md 6.5 */
 static double amplitude_on_mode(const beam *b, int j)
 {
     switch (b->forcing_kind) {
@@ -289,8 +289,8 @@ static double mode_damping(const beam *b, int j, double natural)
     return b->damping_ratio[j] + 0.5 * (b->rayleigh_mass / natural + b->rayleigh_stiffness * natural);
 }
 
-/* The grid s_k = k / N, or k / (N + 1) where the far end cannot move, with the point nearest to `location` put there;
- * returns the index of that point. equations.md 6.8 */
+/* Grid s_k = k / N, or k / (N + 1) where the far end cannot move; its nearest point is moved to `location`. Returns its
+ * index. equations.md 6.8 */
 static int find_grid(const beam *b, double location, double s[VI_MODES])
 {
     const int n = (int)b->modes;
@@ -304,8 +304,8 @@ static int find_grid(const beam *b, double location, double s[VI_MODES])
     return nearest;
 }
 
-/* What a unit impulse at contact k gives to the modal velocities, by collocation: as much velocity of the contact point
- * as by the variational rule, and none of the grid's other points. */
+/* Find the modal velocities after a unit impulse at contact k by collocation. The contact point gets the velocity of
+ * the variational rule, the other points of the grid get none. False for a singular grid. */
 static bool collocate(beam *b, int k)
 {
     vi_structure_model *model = &b->body.model;
@@ -345,7 +345,7 @@ static void set_mode(beam *b, int j, double natural, double ratio)
     vi_structure_mode(&b->body.model, j, natural, ratio, modal_amplitude(b, j), b->body.forcing_angular_frequency);
 }
 
-/* Nothing where no mode depends on its amplitude. */
+/* Adapt the modes to their amplitudes, if any mode depends on its amplitude. */
 static void follow_amplitudes(void *self)
 {
     beam *b = self;
@@ -357,7 +357,7 @@ static void follow_amplitudes(void *self)
         const double a = vi_amplitude_of(b->body.state.q[j], b->body.state.p[j], natural) / b->root_mass;
         const double now = vi_amplitude_natural(&b->amplitude[j], natural, a);
         const double ratio = vi_amplitude_ratio(&b->amplitude[j], mode_damping(b, j, natural), a);
-        /* the ratio is to the frequency of small motion: the stiffness does not change the damping */
+        /* the ratio refers to the frequency of small motion: a changed stiffness keeps the damping */
         set_mode(b, j, now, ratio * natural / now);
     }
     vi_structure_prepare(&b->body.model);
@@ -408,12 +408,12 @@ static bool fill_model(beam *b, char *message)
     return message[0] == '\0';
 }
 
-/* Say which is the first mode that Euler-Bernoulli's theory does not hold for. */
+/* Warn of the first mode for which Euler-Bernoulli's theory does not hold. */
 static void warn_of_validity(const void *self, char message[VI_MESSAGE_LENGTH])
 {
     const beam *b = self;
     if (b->flexural_rigidity > 0.0 && b->mass_per_length > 0.0) {
-        return; /* the section is not known */
+        return; /* unknown section */
     }
     const double slenderness = b->thickness / sqrt(12.0) / b->length;
     const double e_over_g = 2.0 * (1.0 + b->poisson_ratio);
@@ -434,7 +434,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     return parameters_are_good(self, message) && fill_model(self, message);
 }
 
-/* ---- life ---- */
+/* ---- loads and outputs ---- */
 
 static void find_forcing(const void *self, double force[VI_MODES])
 {
@@ -476,7 +476,7 @@ static void update_outputs(void *self, double base_acceleration)
     }
 }
 
-/* Its states are those of the modes. */
+/* The states are those of the modes. */
 static void show_states(void *self, vi_exchange_body *body)
 {
     const beam *b = self;

@@ -8,9 +8,9 @@
 #include "modes/beam_residual.h"
 #include "motion/amplitude.h"
 
-enum { BEAM_SENSORS = 4 };
+enum { BEAM_SENSORS = 4 }; /* most sensors besides the observed point */
 
-/* The numbers are those of the enumerations BeamForcing and ImpactProjection. */
+/* Numbers of the enumerations BeamForcing and ImpactProjection. */
 enum { FORCED_AT_POINT = 1, FORCED_EVENLY = 2, FORCED_AS_MODE = 3, FORCED_BY_BASE = 4 };
 enum { PROJECTION_VARIATIONAL = 1, PROJECTION_COLLOCATION = 2 };
 
@@ -20,7 +20,7 @@ typedef struct {
     double shape[VI_MODES]; /* kg^(-1/2) */
 } beam_sensor;
 
-/* All of a Beam's variables and state (variables.toml says what each is); copying it copies the Beam. */
+/* All variables and state of a Beam, described in variables.toml; copying the struct copies the Beam. */
 typedef struct {
     double time;
     /* parameters */
@@ -40,14 +40,14 @@ typedef struct {
     double force, force_rate;
     /* derived at initialization */
     vi_beam_residual dropped;            /* residual vectors; its `points` are 0 without them */
-    double root_mass;                    /* of the beam: sqrt(mass_per_length * length), kg^(1/2) */
+    double root_mass;                    /* sqrt(mass of the beam), kg^(1/2) */
     double forced_shape[VI_MODES];       /* of forcing_location, kg^(-1/2) */
     double participation[VI_MODES];      /* modal force of a unit acceleration of the base, kg^(1/2) */
-    int32_t depends_on_amplitude;        /* some mode does */
+    int32_t depends_on_amplitude;        /* does a mode depend on its amplitude? */
     /* outputs */
     double modal_displacement[VI_MODES], modal_velocity[VI_MODES], modal_acceleration[VI_MODES];
     beam_sensor sensor[BEAM_SENSORS];
-    vi_body body; /* last: its record is saved only as far as it is used, and nothing after that */
+    vi_body body; /* last member: its record is saved as far as it is used, and nothing after it */
 } beam;
 
 #endif

@@ -10,7 +10,7 @@
 
 static const vi_body_form *const form = &vi_this_body;
 
-static const double DEFAULT_TOLERANCE = 1e-10;
+static const double DEFAULT_TOLERANCE = 1e-10; /* default contact_tolerance */
 
 vi_body *vi_body_of(void *self)
 {
@@ -41,7 +41,7 @@ static void defaults(void *self)
     }
 }
 
-/* The model description has so many ports, or (`external_laws`, 0) no law that another component answers. */
+/* The model description has `count` ports, or (`external_laws`, 0) no law that another component answers. */
 static void sized(void *self, const char *block, int count)
 {
     vi_body *c = vi_body_of(self);
@@ -85,7 +85,7 @@ static void drive(void *self, vi_body *c)
     }
 }
 
-/* Impulses of the contacts come before new forces. */
+/* Impulses of the contacts act before new forces. */
 static void take_impulses(vi_body *c)
 {
     const vi_structure parts = vi_body_parts(c);
@@ -115,7 +115,7 @@ void vi_body_refresh_inputs(void *self)
 static void was_set(void *self, uint32_t reference)
 {
     vi_body *c = vi_body_of(self);
-    const uint32_t from_first = reference - form->restitution; /* wraps to a large number below the first */
+    const uint32_t from_first = reference - form->restitution; /* a large number for references below the first */
     if (vi_this_description.variables[reference].access == VI_SET_TUNABLE) {
         c->forcing_changed = 1;
     }
@@ -138,14 +138,14 @@ static double present_time(const void *self)
     return vi_clock_time(&c->model.clock, c->state.now);
 }
 
-/* cos of the force's phase at the present instant; of forcing_phase when it is constant. */
+/* cos of the force's present phase, or of forcing_phase for a constant force. */
 static double cosine_of_forcing(const vi_body *c)
 {
     const double w = c->model.clock.angular_frequency;
     return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
 }
 
-/* Acceleration of the base at the present instant, m/s^2: the input, and the forcing of this amplitude (m/s^2). */
+/* Present acceleration of the base, m/s^2: the input, plus the forcing of this amplitude (m/s^2). */
 static double base_acceleration(const vi_body *c, double amplitude)
 {
     const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
@@ -225,7 +225,7 @@ static bool start(vi_body *c, double start_time, char *message)
     for (int k = 0; k < VI_PORTS; ++k) {
         vi_contact_clear(&c->contacts[k]);
     }
-    memset(c->state.status, 0, sizeof c->state.status); /* of a start with other start values */
+    memset(c->state.status, 0, sizeof c->state.status); /* clears a start with other start values */
     c->forcing_changed = 0;
     c->model.tolerance = c->contact_tolerance;
     vi_structure_prepare(&c->model);
@@ -255,7 +255,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 
 /* ---- steps ---- */
 
-/* Resolve what is pending; false when the answer is missing or bad. */
+/* Resolve the pending contact; false when the answer is missing or bad. */
 static bool resolve_pending(vi_body *c, char *message)
 {
     if (!c->state.pending) {
@@ -278,14 +278,14 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
-/* Is the next step the rest of one that ended early for no reason of the motion, under the same inputs? Their slopes, and
- * what is found at the start of a step, then hold on. */
+/* Does the next step continue a step that ended for want of budget or room, under the same inputs? Then the slopes of
+ * the inputs, and the results of its start, stay. */
 static bool continues(const vi_body *c)
 {
     return c->state.budget.unfinished && !c->inputs_changed;
 }
 
-/* Complain of a tuned forcing that the body cannot go on with. */
+/* Complain of a tuned forcing with which the body cannot go on. */
 static void check_drive(const void *self, const vi_body *c, char *message)
 {
     if (c->forcing_changed) {
@@ -343,7 +343,7 @@ static bool needs_events(const void *self)
     return false;
 }
 
-/* What follows from the rest is not saved, nor are unused rows of the record. */
+/* Caches and unused rows of the record are not saved. */
 static size_t used_size(const void *self)
 {
     const vi_body *c = const_body_of(self);

@@ -6,9 +6,9 @@
 
 #include "body/law_check.h"
 
-/* An importer's communication point may differ from the body's own time by this times (1 + |time|), s. */
+/* Largest difference of an importer's communication point from the body's own time, s, in units of 1 + |time|. */
 static const double TIME_MISMATCH = 1e-9;
-static const double LOOSEST_TOLERANCE = 1e-2;
+static const double LOOSEST_TOLERANCE = 1e-2; /* largest valid contact_tolerance */
 
 /* ---- parameters and inputs ---- */
 
@@ -48,7 +48,7 @@ static void check_contact(char *message, int k, const vi_contact *contact, bool 
     }
 }
 
-/* The name is written only where it is needed: inputs are checked in every step. */
+/* Names are written only for a complaint, since inputs are checked in every step. */
 static void check_port_input(char *message, int k, const char *variable, double value)
 {
     if (!isfinite(value)) {
@@ -92,7 +92,7 @@ static bool at_one_point(const vi_structure_model *model, int i, int j)
     return memcmp(model->shape[i], model->shape[j], (size_t)vi_structure_modes(model) * sizeof(double)) == 0;
 }
 
-/* Does the body meet stop i first, for good? A rigid one is never passed. */
+/* Does the body always meet stop i before stop j? A rigid stop is never passed. */
 static bool hides(const vi_contact *i, const vi_contact *j)
 {
     return vi_contact_law_is_rigid(i->law.law)
@@ -115,7 +115,7 @@ static void check_pair(const vi_contact contacts[], int i, int j, char *message)
     }
 }
 
-/* Contacts i and j are at the same point of the body when their shapes are equal. */
+/* Contacts i and j are at the same point of the body if their shapes are equal. */
 void vi_body_check_points(const vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     for (int j = 1; j < c->model.contacts; ++j) {
@@ -152,7 +152,7 @@ bool vi_body_check_step(const vi_body *c, const vi_step_request *request, vi_ins
         vi_complain(message, "currentCommunicationPoint: expected %.17g (the end of the last step), got %.17g", now,
                     request->time);
     }
-    /* the end of the step with its rounding, so that steps of 1e-9 s at 1e6 s are no shorter or longer */
+    /* the end of the step with its rounding, so that steps of 1e-9 s at 1e6 s keep their length */
     const double high = request->time + request->size;
     const double part = high - request->time;
     const double low = (request->time - (high - part)) + (request->size - part);
@@ -164,7 +164,7 @@ bool vi_body_check_step(const vi_body *c, const vi_step_request *request, vi_ins
     return message[0] == '\0';
 }
 
-/* A stop that answers with a force has answered once its importer goes on: the force follows by the inputs. */
+/* Check the answer of a rigid stop. A force needs no answer: it is an input, there once the importer goes on. */
 static void check_answer(const vi_body *c, int k, char *message)
 {
     const vi_contact *contact = &c->contacts[k];
@@ -179,7 +179,7 @@ static void check_answer(const vi_body *c, int k, char *message)
 bool vi_body_check_answers(const vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     for (int k = 0; k < c->model.contacts; ++k) {
-        if (c->state.asking[k]) { /* several at one instant wait for their answers together */
+        if (c->state.asking[k]) { /* contacts at one instant wait for their answers together */
             check_answer(c, k, message);
         }
     }

@@ -1,4 +1,4 @@
-/* What is wrong with a body's parameters, inputs and steps; each complains in `message`. */
+/* Checks of a body's parameters, inputs and steps; each complains in `message`. */
 #ifndef VIBROIMPACT_BODY_CHECK_H
 #define VIBROIMPACT_BODY_CHECK_H
 
@@ -6,14 +6,14 @@
 
 void vi_body_check_inputs(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
-/* Stops at one point of the body leave room, and no rigid one hides the one behind it; the model is prepared. */
+/* Check that stops at one point leave room, and that no rigid stop hides another; the model must be prepared. */
 void vi_body_check_points(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
-/* Is the step one that can be made? *target: its end. */
+/* Can this step be made? *target: its end. */
 bool vi_body_check_step(const vi_body *c, const vi_step_request *request, vi_instant *target,
                         char message[VI_MESSAGE_LENGTH]);
 
-/* Has each contact that asks for an answer a good one? */
+/* Has each contact that asks for an answer received a valid one? */
 bool vi_body_check_answers(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 #endif

@@ -1,4 +1,4 @@
-/* A body that an importer integrates: model exchange. */
+/* Model exchange of a body: the importer integrates it. */
 #ifndef VIBROIMPACT_BODY_EXCHANGE_H
 #define VIBROIMPACT_BODY_EXCHANGE_H
 
@@ -6,7 +6,7 @@
 
 extern const vi_model_exchange vi_body_exchange;
 
-/* Put the event indicators into the outputs of the contacts. */
+/* Write the event indicators to the outputs of the contacts. */
 void vi_body_show_indicators(void *self);
 
 #endif

@@ -6,7 +6,7 @@
 
 #include "chain_variables.h"
 
-enum { START_MASSES = 2 };
+enum { START_MASSES = 2 }; /* default number of masses */
 
 static void defaults(void *self)
 {
@@ -91,7 +91,7 @@ static bool parameters_are_good(const chain *c, char *message)
 
 /* ---- from parameters to modes ---- */
 
-/* A port without a law may have any number: the last mass then. */
+/* Index of a mass; the last mass for other numbers, which ports without a law may have. */
 static int index_of(const chain *c, int64_t number)
 {
     return (int)(number < 1 || number > c->masses ? c->masses : number) - 1;
@@ -102,7 +102,7 @@ static int modes_of(const chain *c)
     return (int)(c->modes == 0 ? c->masses : c->modes);
 }
 
-/* Sum over the masses of shape * load: the modal forces of loads on the masses. equations.md 5.2 */
+/* Project loads on the masses to modal forces: sums of shape * load over the masses. equations.md 5.2 */
 static void project(const chain *c, const double load[VI_MODES], double modal[VI_MODES])
 {
     for (int j = 0; j < modes_of(c); ++j) {
@@ -128,7 +128,7 @@ static bool find_modes(chain *c, vi_chain_modes *modes, char *message)
     return true;
 }
 
-/* Modal amplitudes of the harmonic force and of the base's inertial one; a force of frequency 0 is constant. */
+/* Modal amplitudes of the harmonic force and of the base's inertial force; a force of frequency 0 is constant. */
 static void find_forcing(const void *self, double force[VI_MODES])
 {
     const chain *c = self;
@@ -166,7 +166,7 @@ static void fill_model(chain *c, const vi_chain_modes *modes)
     memcpy(model->observed, c->shape[index_of(c, c->observed_mass)], sizeof model->observed);
 }
 
-/* q = Psi' M x, the inverse of x = Psi q where all modes are in use; else what of x those in use can do. */
+/* q = Psi' M x, the inverse of x = Psi q if all modes are in use; otherwise the part of x in these modes. */
 static void start_modes(chain *c)
 {
     double displacement[VI_MODES], velocity[VI_MODES];
@@ -190,7 +190,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
-/* ---- life ---- */
+/* ---- loads and outputs ---- */
 
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {
@@ -220,7 +220,7 @@ static void update_outputs(void *self, double base_acceleration)
     }
 }
 
-/* Its states are those of the masses. */
+/* The states are those of the masses. */
 static void show_states(void *self, vi_exchange_body *body)
 {
     chain *c = self;

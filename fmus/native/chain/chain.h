@@ -7,13 +7,13 @@
 #include "body.h"
 #include "modes/chain_modes.h"
 
-/* All of a Chain's variables and state (variables.toml says what each is); copying it copies the Chain. */
+/* All variables and state of a Chain, described in variables.toml; copying the struct copies the Chain. */
 typedef struct {
     double time;
     /* parameters */
     int64_t masses, masses_described;
     int64_t modes;                       /* in use; 0: all */
-    vi_chain parameter; /* masses, springs, dashpots; the far spring is put in its place at initialization */
+    vi_chain parameter; /* masses, springs, dashpots; initialization adds the far spring and dashpot */
     double far_stiffness, far_damping;
     double forcing_amplitude[VI_MODES], forcing_base_acceleration;
     double displacement_start[VI_MODES], velocity_start[VI_MODES];
@@ -24,7 +24,7 @@ typedef struct {
     /* outputs */
     double displacement[VI_MODES], velocity[VI_MODES], acceleration[VI_MODES], relative_acceleration[VI_MODES];
     double shape[VI_MODES][VI_MODES]; /* shape[i][j]: displacement of mass i for q_j = 1, kg^(-1/2) */
-    vi_body body; /* last: its record is saved only as far as it is used, and nothing after that */
+    vi_body body; /* last member: its record is saved as far as it is used, and nothing after it */
 } chain;
 
 #endif

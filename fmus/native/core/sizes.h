@@ -1,4 +1,4 @@
-/* The largest bodies that a library is compiled for; a component's variables.toml says its own. */
+/* Largest sizes of bodies in a library; each component's variables.toml sets its own. */
 #ifndef VIBROIMPACT_SIZES_H
 #define VIBROIMPACT_SIZES_H
 
@@ -9,7 +9,7 @@
 #define VI_PORTS 8 /* contacts of a structure */
 #endif
 #ifndef VI_ONLY_MODES
-#define VI_ONLY_MODES 0 /* the one number of modes that its bodies have, which costs no loops then; 0: any up to VI_MODES */
+#define VI_ONLY_MODES 0 /* number of modes that all bodies have, known to the compiler; 0: any up to VI_MODES */
 #endif
 
 #endif

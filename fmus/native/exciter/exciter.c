@@ -20,7 +20,7 @@ static void update_outputs(void *self)
     it->force = apart ? vi_magnet_force(&it->magnet, it->input, it->displacement) : NAN;
 }
 
-/* A body on the exciter is no set-up that this law knows of; the next step says so. */
+/* The law does not hold for a body on the exciter; the next step says so. */
 static void check_gap(const exciter *it, char *message)
 {
     if (!(vi_magnet_gap(&it->magnet, it->displacement) > 0.0)) {

@@ -6,7 +6,7 @@
 
 #include "measuring/magnet.h"
 
-/* All of an Exciter's variables (variables.toml says what each is). */
+/* All variables of an Exciter, described in variables.toml. */
 typedef struct {
     double time;
     vi_magnet magnet;

@@ -1,8 +1,8 @@
-/* The Gain component: its output is a number times its input, in units of their own. */
+/* The Gain component: its output is a factor times its input, each in its own unit. */
 #ifndef VIBROIMPACT_GAIN_H
 #define VIBROIMPACT_GAIN_H
 
-/* All of a Gain's variables (variables.toml says what each is). */
+/* All variables of a Gain, described in variables.toml. */
 typedef struct {
     double time;
     double factor;

@@ -7,7 +7,7 @@
 #include "impact_stop_variables.h"
 #include "plain.h"
 
-/* A body comes to the surface within the rounding of its displacement: this times that and the position, m. */
+/* Distance from the surface, relative to displacement and position, up to which a body is on the surface: rounding. */
 static const double SURFACE_ROUNDING = 4.0 * DBL_EPSILON;
 
 static void defaults(void *self)
@@ -19,7 +19,7 @@ static void defaults(void *self)
     stop->applied_restitution = 1.0;
 }
 
-/* A body on the surface that does not leave it is in the stop by the least that there is. */
+/* Penetration, m. A body on the surface that does not leave it has the smallest positive penetration. */
 static double penetration_of(const impact_stop *stop, double rate)
 {
     const double penetration = vi_contact_direction(stop->side) * (stop->displacement - stop->position);

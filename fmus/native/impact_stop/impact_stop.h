@@ -4,7 +4,7 @@
 
 #include "contact/contact_law.h"
 
-/* All of an ImpactStop's variables (variables.toml says what each is). */
+/* All variables of an ImpactStop, described in variables.toml. */
 typedef struct {
     double time;
     vi_contact_law law;

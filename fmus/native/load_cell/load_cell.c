@@ -11,7 +11,7 @@ static void defaults(void *self)
     ((load_cell *)self)->cell.settings.sensitivity = 1.0;
 }
 
-/* A new force is on the cell at once; what rings needs time. */
+/* A new force is on the cell at once, but the cell's ringing needs time. */
 static void update_outputs(void *self)
 {
     load_cell *it = self;
@@ -56,7 +56,7 @@ static void check_inputs(const load_cell *it, char *message)
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     load_cell *it = self;
-    it->counted = it->impulse; /* before the start */
+    it->counted = it->impulse; /* impacts before the start are not counted */
     check_parameters(&it->cell.settings, message);
     check_inputs(it, message);
     vi_check_finite(message, "start time", start_time);
@@ -68,7 +68,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     return true;
 }
 
-/* Impacts of a step are one half sine, begun with the last of them. */
+/* Impacts of one step are one half sine, which begins with the last of them. */
 static bool take_impacts(load_cell *it, double end, double slope)
 {
     const double impulse = it->impulse - it->counted;

@@ -4,12 +4,12 @@
 
 #include "measuring/cell.h"
 
-/* All of a LoadCell's variables (variables.toml says what each is). */
+/* All variables of a LoadCell, described in variables.toml. */
 typedef struct {
     double force, impulse, impact_time; /* inputs */
     double load, output;
     double counted; /* impulse up to the start of the step, N s */
-    vi_cell cell;   /* last: only the used part is saved with a state */
+    vi_cell cell;   /* last member: only the used part is saved with a state */
 } load_cell;
 
 #endif

@@ -6,8 +6,8 @@
 #include "noise_variables.h"
 #include "plain.h"
 
-/* A time closer to the next number than this part of the interval is at it, also where the summed steps of an importer
- * fall a little short of it. */
+/* Time to the next number, as a part of the interval, below which the time is at this number. Summed steps of an
+ * importer may fall a little short of it. */
 static const double SAME_INSTANT = 1e-4;
 
 static void defaults(void *self)
@@ -15,7 +15,7 @@ static void defaults(void *self)
     ((noise *)self)->rate = 1000.0;
 }
 
-/* Number `index` of the noise; those before time 0 have indices too. */
+/* Number `index` of the noise; times before 0 have indices too. */
 static double number(const noise *it)
 {
     const double place = floor(it->time * it->rate + SAME_INSTANT);

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* All of a Noise's variables (variables.toml says what each is). */
+/* All variables of a Noise, described in variables.toml. */
 typedef struct {
     double time;
     double rms, rate;

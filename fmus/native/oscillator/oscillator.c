@@ -53,7 +53,7 @@ static bool parameters_are_good(const oscillator *o, char *message)
 
 /* ---- from parameters to the mode: mass-normalised, q = sqrt(mass) x ---- */
 
-/* Modal amplitude of the harmonic force and of the base's inertial one; a force of frequency 0 is constant. */
+/* Modal amplitude of the harmonic force and of the base's inertial force; a force of frequency 0 is constant. */
 static void find_forcing(const void *self, double force[VI_MODES])
 {
     const oscillator *o = self;
@@ -62,7 +62,7 @@ static void find_forcing(const void *self, double force[VI_MODES])
     force[0] = amplitude * share / sqrt(o->mass);
 }
 
-/* The mode with this dashpot and spring. */
+/* Set the mode for this dashpot and spring. */
 static void fill_mode(oscillator *o, double damping, double stiffness)
 {
     vi_mode *mode = &o->body.model.mode[0];
@@ -94,7 +94,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
-/* Spring and dashpot as they are at the present amplitude, until the next step; nothing where they do not depend on it. */
+/* Adapt spring and dashpot to the present amplitude, until the next step, if they depend on it. */
 static void follow_amplitude(void *self)
 {
     oscillator *o = self;
@@ -105,12 +105,12 @@ static void follow_amplitude(void *self)
     const double a = vi_amplitude_of(o->body.state.q[0] / root, o->body.state.p[0] / root, natural);
     const double now = vi_amplitude_natural(&o->amplitude, natural, a);
     const double ratio = vi_amplitude_ratio(&o->amplitude, 0.5 * o->damping / (root * sqrt(o->stiffness)), a);
-    /* the ratio is to the frequency of small motion: the spring does not stiffen the dashpot */
+    /* the ratio refers to the frequency of small motion: a stiffer spring keeps the dashpot */
     fill_mode(o, 2.0 * ratio * natural * o->mass, now * now * o->mass);
     vi_structure_prepare(&o->body.model);
 }
 
-/* ---- life ---- */
+/* ---- loads and outputs ---- */
 
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {

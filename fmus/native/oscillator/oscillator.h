@@ -5,7 +5,7 @@
 #include "body.h"
 #include "motion/amplitude.h"
 
-/* All of an Oscillator's variables and state (variables.toml says what each is); copying it copies the Oscillator. */
+/* All variables and state of an Oscillator, described in variables.toml; copying the struct copies the Oscillator. */
 typedef struct {
     double time;
     /* parameters */
@@ -17,7 +17,7 @@ typedef struct {
     double force, force_rate;
     /* outputs */
     double relative_acceleration;
-    vi_body body; /* last: its record is saved only as far as it is used, and nothing after that */
+    vi_body body; /* last member: its record is saved as far as it is used, and nothing after it */
 } oscillator;
 
 #endif

@@ -3,10 +3,10 @@
 #include <math.h>
 #include <stddef.h>
 
-/* A time closer to a sample than this part of the sampling interval is at the sample: the slope is then that of the
- * segment that begins there, also where the summed steps of an importer fall a little short of it. */
+/* Distance from a sample, as a part of the sampling interval, below which a time is at the sample. The slope is then
+ * that of the segment beginning there. Summed steps of an importer may fall a little short of the sample. */
 static const double SAME_INSTANT = 1e-4;
-/* The same in spacings of doubles at that time, for records that lie far from time 0. */
+/* Distance added to this, in spacings of doubles at the time, for records far from time 0. */
 static const double ROUNDINGS = 4.0;
 
 static double instant(const vi_axis *axis, int64_t index)
@@ -20,7 +20,7 @@ static double span(const vi_axis *axis, int64_t left, int64_t right)
     return axis->times == NULL ? (double)(right - left) * axis->interval : axis->times[right] - axis->times[left];
 }
 
-/* The last sample that is not after `time`, or the first. */
+/* The last sample not after `time`, or the first sample. */
 static int64_t index_before(const vi_axis *axis, double time)
 {
     int64_t low = 0, high = axis->count; /* the sample is in [low, high) */
@@ -55,14 +55,14 @@ vi_place vi_axis_place(const vi_axis *axis, double time)
     return place;
 }
 
-/* The samples that have a value up to `index` (-1: none), and after it (the count: none). */
+/* Nearest samples with a value: up to `index` (-1: none), and after it (the count: none). */
 typedef struct {
     int64_t left, right;
 } vi_neighbours;
 
 static vi_neighbours neighbours(const vi_signal *signal, int64_t index)
 {
-    /* gaps before `low` begin up to index + 1, those from `high` on later; a value lies between any two */
+    /* gaps before `low` begin up to index + 1, gaps from `high` on begin later; a value lies between any two */
     int64_t low = 0, high = signal->gap_count;
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
@@ -73,7 +73,7 @@ static vi_neighbours neighbours(const vi_signal *signal, int64_t index)
         }
     }
     vi_neighbours found = {index, index + 1};
-    if (low > 0 && signal->gaps[low - 1].last >= index) { /* else it ends before the index */
+    if (low > 0 && signal->gaps[low - 1].last >= index) { /* otherwise the gap ends before the index */
         const vi_gap gap = signal->gaps[low - 1];
         found.left = gap.first <= index ? gap.first - 1 : index;
         found.right = gap.last + 1;
@@ -81,7 +81,7 @@ static vi_neighbours neighbours(const vi_signal *signal, int64_t index)
     return found;
 }
 
-/* Slope between two samples with a value; 0 before the first and after the last. */
+/* Slope between two samples with a value; 0 before the first sample and after the last. */
 static double slope(const vi_signal *signal, const vi_axis *axis, vi_neighbours between)
 {
     if (between.left < 0 || between.right >= axis->count) {
@@ -90,7 +90,7 @@ static double slope(const vi_signal *signal, const vi_axis *axis, vi_neighbours 
     return (signal->values[between.right] - signal->values[between.left]) / span(axis, between.left, between.right);
 }
 
-/* At a sample with a value. The rest of a step that falls short of it is the end of the segment before. */
+/* Play a sample with a value. The remainder of a step that falls short of the sample belongs to the segment before. */
 static vi_playing at_sample(const vi_signal *signal, const vi_axis *axis, const vi_place *place, vi_neighbours around)
 {
     const double rate = slope(signal, axis, around);

@@ -1,4 +1,4 @@
-/* What a channel of a recording is at a time: a function of the time alone, linear between samples. */
+/* Value of a channel of a recording at a time: a function of the time alone, linear between samples. */
 #ifndef VIBROIMPACT_PLAYER_H
 #define VIBROIMPACT_PLAYER_H
 
@@ -6,23 +6,23 @@
 
 #include "recording.h"
 
-/* Where a time lies on an axis: `since` seconds after sample `index`, or at it, or outside the record. */
+/* Place of a time on an axis: `since` seconds after sample `index`, or at it, or outside the record. */
 typedef struct {
     int64_t index;
     double since;
     bool on_sample, outside;
 } vi_place;
 
-/* Value, slope (1/s) of what comes, and whether the value was measured. */
+/* Value, slope of the segment that begins (1/s), and whether the value was measured. */
 typedef struct {
     double value, rate;
     bool valid;
 } vi_playing;
 
-/* The place of a finite time, s. */
+/* The place of a finite time, s, on an axis. */
 vi_place vi_axis_place(const vi_axis *axis, double time);
 
-/* What a signal is at a place of its axis. */
+/* The signal at a place of its axis. */
 vi_playing vi_signal_at(const vi_signal *signal, const vi_axis *axis, const vi_place *place);
 
 #endif

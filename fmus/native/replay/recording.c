@@ -12,13 +12,13 @@
 static const char LIST[] = "signals/signals.txt";
 static const char FORMAT[] = "vibroimpact signals 2";
 
-/* Longest line of the list, and longest name of a channel, with their ends. */
+/* Longest line of the list, longest name of a channel, longest name of a file, each with its end. */
 enum { LINE_LENGTH = 160, NAME_LENGTH = 101, FILE_LENGTH = NAME_LENGTH + 32 };
 
 /* Most numbers of all files together. */
 enum { MOST_NUMBERS = 100000000 };
 
-/* A recording while it is read: from which folder, where to complain, how many numbers may still come. */
+/* State of reading a recording: its folder, the message for complaints, the room for further numbers. */
 typedef struct {
     const char *folder;
     char *message;
@@ -28,7 +28,7 @@ typedef struct {
 
 /* ---- files of numbers ---- */
 
-/* Little-endian numbers in the order of this machine. */
+/* Bring little-endian numbers to the byte order of this machine. */
 static void to_own_order(double numbers[], int64_t count)
 {
     const uint16_t probe = 1;
@@ -47,7 +47,7 @@ static void to_own_order(double numbers[], int64_t count)
     }
 }
 
-/* Is a file as long as `count` numbers? Asked before memory is taken for them. */
+/* Does a file have the length of `count` numbers? Checked before memory is allocated for them. */
 static bool has_length(FILE *file, int64_t count)
 {
     const bool good = fseek(file, 0, SEEK_END) == 0 && ftell(file) == (long)(count * (int64_t)sizeof(double));
@@ -98,7 +98,7 @@ static bool ascends(const double times[], int64_t count)
     return isfinite(times[0]) && isfinite(times[count - 1]);
 }
 
-/* An even axis has its start and its interval in its file, another one all its instants. */
+/* Add an axis: the file of an even axis holds start and interval, the file of another axis all instants. */
 static bool add_axis(vi_reader *reader, bool even, int64_t count)
 {
     vi_axis *axis = &reader->recording->axes[reader->recording->axis_count];
@@ -131,7 +131,7 @@ static bool add_axis(vi_reader *reader, bool even, int64_t count)
 
 /* ---- channels ---- */
 
-/* Count the gaps and, where there is room for them, write them. */
+/* Count the gaps, and write them if `gaps` is given. */
 static int64_t find_gaps(const double values[], int64_t count, vi_gap *gaps)
 {
     int64_t found = 0;
@@ -194,7 +194,7 @@ static bool add_channel(vi_reader *reader, const char *channel, int axis)
 
 /* ---- the list ---- */
 
-/* What a name may be made of leads to no other folder. */
+/* Is this a valid name? Its characters cannot lead to another folder. */
 static bool is_name(const char *text)
 {
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
@@ -218,7 +218,7 @@ static bool read_line(vi_reader *reader, const char *line, int number)
     char word[8] = "", name[NAME_LENGTH] = "";
     int64_t count = 0;
     int used = 0;
-    /* the widths are those of the room, and of a number that fits */
+    /* the widths are those of the buffers, and of a number that fits */
     const int fields = sscanf(line, "%7s %100s %9" SCNd64 " %n", word, name, &count, &used);
     const bool whole = fields == 3 && line[used] == '\0';
     const bool even = strcmp(name, "even") == 0;

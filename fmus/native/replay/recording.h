@@ -1,4 +1,4 @@
-/* A recording in memory: the signal files of the folder of resources (README.md says what they hold), read once. */
+/* A recording in memory: the signal files of the folder of resources (README.md gives their format), read once. */
 #ifndef VIBROIMPACT_RECORDING_H
 #define VIBROIMPACT_RECORDING_H
 
@@ -6,7 +6,7 @@
 
 #include "body/complaint.h"
 
-enum { VI_REPLAY_CHANNELS = 256 };
+enum { VI_REPLAY_CHANNELS = 256 }; /* most channels, and most axes, of a recording */
 
 /* Instants of samples, s: evenly spaced from `start`, or listed in `times`. */
 typedef struct {
@@ -28,15 +28,15 @@ typedef struct {
     int64_t gap_count;
 } vi_signal;
 
-/* What the files hold. */
+/* Contents of the files. */
 typedef struct {
     int axis_count, signal_count;
     vi_axis axes[VI_REPLAY_CHANNELS];
     vi_signal signals[VI_REPLAY_CHANNELS];
 } vi_recording;
 
-/* Read the recording in a folder of resources. Without a folder, or without signal files in it, a recording without
- * channels; NULL, with the reason in `message`, where files are not what they must be or memory is out. */
+/* Read the recording in a folder of resources. Without a folder, or without signal files in it, the recording has no
+ * channels. NULL, with the reason in `message`, for invalid files or when memory is out. */
 vi_recording *vi_recording_open(const char *folder, char message[VI_MESSAGE_LENGTH]);
 
 void vi_recording_close(vi_recording *recording);

@@ -97,7 +97,7 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     return vi_plain_start(self, start_time, message);
 }
 
-/* The recording itself stays where it is. */
+/* The recording itself is not saved. */
 static size_t used_size(const void *self)
 {
     return offsetof(replay, channels) + (size_t)channel_count(self) * sizeof(replay_channel);

@@ -11,12 +11,12 @@ typedef struct {
     double gain, offset;
 } replay_channel;
 
-/* All of a Replay's variables (variables.toml says what each is). What follows `channels` is no part of its state. */
+/* All variables of a Replay, described in variables.toml. Members after `channels` are no part of its state. */
 typedef struct {
     double time, time_shift;
     replay_channel channels[VI_REPLAY_CHANNELS];
-    const vi_recording *recording; /* NULL: none is there yet */
-    int described;                 /* channels in the model description; -1: it does not say */
+    const vi_recording *recording; /* NULL: not given yet */
+    int described;                 /* channels in the model description; -1: unknown */
 } replay;
 
 #endif

@@ -1,10 +1,10 @@
-/* The Sensor component: a voltage of what it measures. */
+/* The Sensor component: a voltage for a measured value. */
 #ifndef VIBROIMPACT_SENSOR_H
 #define VIBROIMPACT_SENSOR_H
 
 #include "measuring/reading.h"
 
-/* All of a Sensor's variables (variables.toml says what each is). */
+/* All variables of a Sensor, described in variables.toml. */
 typedef struct {
     double time;
     vi_reading reading;

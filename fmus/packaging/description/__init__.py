@@ -1,7 +1,7 @@
 """One `variables.toml` per component generates everything that lists its variables.
 
 Both modelDescription.xml files, the C header with the value references, and the table in the component's
-README come from the same file. Imports the standard library only: the package's own build uses it.
+README come from the same file. The folder imports the standard library only: the package's own build uses it.
 """
 
 from vibroimpact.fmus.packaging.description.c_header import c_header, header_name

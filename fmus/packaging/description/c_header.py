@@ -1,4 +1,4 @@
-"""The C header of a component: value references, token and the table that the adapters read and write by."""
+"""The C header of a component: value references, token and the table by which the adapters read and write."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _lines(component: ComponentDescription) -> Iterator[str]:
 
 
 def _states(component: ComponentDescription, prefix: str) -> Iterator[str]:
-    """Yield the table of the continuous states, in their order; none where there are none."""
+    """Yield the table of the continuous states, in their order; yield nothing if there are none."""
     codes = {v.name: v.code for v in component.variables}
     states = component.states()
     if states:
@@ -50,7 +50,7 @@ def _states(component: ComponentDescription, prefix: str) -> Iterator[str]:
 
 
 def _description(component: ComponentDescription) -> Iterator[str]:
-    """Yield the description that the adapters link: one C file alone includes the header."""
+    """Yield the description that the adapters link; only one C file includes the header."""
     (time,) = (v.field for v in component.variables if v.causality == "independent")
     yield from ("", "const vi_description vi_this_description = {", f'    .token = "{component.token}",')
     yield f"    .struct_size = sizeof({component.struct}),"

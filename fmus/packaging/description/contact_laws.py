@@ -1,6 +1,6 @@
-"""The enumeration of contact laws, read from the table of the C core: `core/contact/contact_law.c` says each law once.
+"""The enumeration of contact laws, read from the table of the C core in `core/contact/contact_law.c`.
 
-A row there begins `[number] = {.name = "...", .description = "...",` and says by `.stop` and `.external` who answers.
+Each row there begins `[number] = {.name = "...", .description = "...",`; `.stop` and `.external` say who answers.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ROW = re.compile(
 )
 _STOP, _EXTERNAL = re.compile(r"\.stop = VI_(RIGID|YIELDING)_STOP\b"), re.compile(r"\.external = true\b")
 _START_OF_ROW = re.compile(r"^    \[", re.MULTILINE)
-#: Ports that an enumeration item is for, where another FMU answers for the stop or hits the point.
+#: Ports of an enumeration item whose contact another FMU answers, or that another FMU hits.
 _EXTERNAL_PORTS = "external"
 
 
@@ -30,14 +30,14 @@ def contact_laws(path: Path, *, of_stop: bool = False) -> tuple[EnumerationItem,
     Parameters
     ----------
     path : Path
-        The C file of the table.
+        The C file with the table.
     of_stop : bool
-        Only the laws that a stop evaluates itself.
+        Whether to return only laws that a stop evaluates itself.
 
     Raises
     ------
     ComponentFileError
-        The file has no such table, or a row of another form.
+        The file has no such table, or a row has another form.
     """
     try:
         text = path.read_text(encoding="utf-8")

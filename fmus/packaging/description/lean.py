@@ -1,7 +1,7 @@
-"""A component as other tools take it: what only this package's importer uses is left out.
+"""A component for other tools, without the variables that only this package's importer uses.
 
-OMSimulator writes no result when an output is NaN before its first event, or when there is an array; libcosim and Ecos
-cannot set an enumeration. The binary is the same: variables that no description mentions keep their values.
+OMSimulator writes no result if an output is NaN before its first event, or if there is an array. libcosim and Ecos
+cannot set an enumeration. The binary is the same: variables outside of the description keep their values.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vibroimpact.fmus.packaging.description.model import (
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """What a tool offers first: start and stop time and step, s, and a relative tolerance."""
+    """Default experiment of a description: start and stop time and step, s, and a relative tolerance."""
 
     stop_time: float = 10.0
     step_size: float = 0.01
@@ -30,7 +30,7 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True)
 class Edition:
-    """Which version of the package wrote a description, and when (empty: not told); what to try with it."""
+    """Version of the package that wrote a description, time of writing (may be empty), and the default experiment."""
 
     version: str
     date_and_time: str
@@ -40,10 +40,10 @@ class Edition:
 def lean(
     component: ComponentDescription, *, external: bool = False, enumerations: bool = False
 ) -> ComponentDescription:
-    """Return a component without what few tools take.
+    """Return a component without the variables that few tools can handle.
 
-    `external` keeps what a tool needs that answers contacts itself: applied forces, contact masses, instants of
-    contacts. Enumerations are else integers, their names in the descriptions.
+    `external` keeps the variables of tools that answer contacts themselves: applied forces, contact masses, instants of
+    contacts. Without `enumerations`, enumerations become integers, with the names in their descriptions.
     """
     left_out = {"importer"} if external else {"importer", "external"}
     types = {e.name: _without(e, left_out) for e in component.enumerations}
@@ -66,7 +66,7 @@ def with_starts(component: ComponentDescription, starts: Mapping[str, Number]) -
 
 
 def with_units(component: ComponentDescription, units: Mapping[str, UnitDefinition]) -> ComponentDescription:
-    """Return a component with units, by name, of variables that have none of their own."""
+    """Return a component with units, by name, for variables that have no unit of their own."""
     known = {unit.name: unit for unit in (*component.units, *units.values())}
     named = (replace(v, unit=units[v.name].name) if v.name in units else v for v in component.variables)
     return replace(component, units=tuple(known.values()), variables=tuple(named))

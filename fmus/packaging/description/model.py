@@ -1,4 +1,4 @@
-"""What a component's `variables.toml` says, as plain frozen data."""
+"""Content of a component's `variables.toml`, as plain frozen data."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Number = float | int | bool
 
 
 def plural(block: str) -> str:
-    """Return what several of a repeated block are called: `contacts`, `masses`."""
+    """Return the plural of a repeated block's name: `contacts`, `masses`."""
     return f"{block}es" if block.endswith("s") else f"{block}s"
 
 
-#: FMI's default of `initial` for each (causality, variability); absent pairs have none.
+#: FMI's default of `initial` for each (causality, variability); absent pairs have no default.
 DEFAULT_INITIAL = {
     ("parameter", "fixed"): "exact",
     ("parameter", "tunable"): "exact",
@@ -74,13 +74,13 @@ class Variable:
     causality: str
     variability: str
     initial: str | None
-    """FMI's `initial`; None for inputs and the independent variable, which have no such attribute."""
+    """FMI's `initial`; None for inputs and the independent variable, which lack this attribute."""
     value_reference: int
     """Index into the C table of variables; the same in both FMI versions and in every export."""
     field: str
-    """Member of the component's C struct that stores it."""
+    """Member of the component's C struct that stores the variable."""
     code: str
-    """Name of its value reference in C, without the component's prefix."""
+    """Name of the value reference in C, without the component's prefix."""
     unit: str = ""
     enumeration: str = ""
     start: Number | None = None
@@ -88,50 +88,50 @@ class Variable:
     maximum: Number | None = None
     dimensions: tuple[int, ...] = ()
     dependencies: tuple[str, ...] | None = None
-    """Knowns an output depends on (None: maybe all); only inputs reach the description, FMI counts no parameter."""
+    """Inputs and parameters that an output depends on (None: maybe all); a description lists only the inputs."""
     versions: tuple[int, ...] = (2, 3)
     repeat: str = ""
-    """Name of the block it repeats in (`contact`), empty for a single variable."""
+    """Name of the block that the variable repeats in (`contact`), empty for a single variable."""
     repeat_index: int = 0
     """1-based index in that block, 0 for a single variable."""
     counts: str = ""
-    """Name of the block of which it says how many are in use (`mode`); an export gives it that start value."""
+    """Name of the block whose number in use the variable holds (`mode`); an export starts it with that number."""
     ports: str = ""
-    """Who has a use for it: this package's `importer`, an `external` tool that answers contacts; empty: everybody."""
+    """User of the variable: this package's `importer`, an `external` tool that answers contacts; empty: everybody."""
     derivative: str = ""
-    """Name of the continuous state whose derivative it is, in model exchange."""
+    """Name of the continuous state whose derivative the variable is, in model exchange."""
     event_indicator: bool = False
-    """Whether its sign tells of events, in model exchange."""
+    """Whether a change of its sign marks an event, in model exchange."""
     shown_name: str = ""
     shown_description: str = ""
     """`shown_name` and `shown_description` are for a reader: with the letter k in place of the index."""
 
     @property
     def count(self) -> int:
-        """Number of scalars it holds."""
+        """Number of scalars in the variable."""
         return prod(self.dimensions)
 
     @property
     def is_initial_unknown(self) -> bool:
-        """Whether ModelStructure lists it among the unknowns of initialization."""
+        """Whether ModelStructure lists the variable among the unknowns of initialization."""
         calculated_output = self.causality == "output" and self.initial in {"approx", "calculated"}
         return calculated_output or bool(self.derivative) or self.causality == "calculatedParameter"
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentDescription:
-    """One component: what its two model descriptions, its C header and its README table are made of.
+    """One component: the source of its two model descriptions, its C header and its README table.
 
     Attributes
     ----------
     token : str
-        Identifies this very list of variables; FMI 3.0 instantiationToken and FMI 2.0 guid.
+        Identifier of exactly this list of variables; instantiationToken of FMI 3.0, guid of FMI 2.0.
     repeats : mapping of str to int
-        How often each repeated block occurs, `{"contact": 2}`.
+        Number of copies of each repeated block, `{"contact": 2}`.
     start_of_export : mapping of str to float
-        Start values, by variable name, of an export that is given none: a run of it shows motion.
+        Start values, by variable name, for an export without start values of its own: its run shows motion.
     core : tuple of str
-        Modules of the core that it is made of, `body/complaint`; empty: all of them.
+        Modules of the core in this component, `body/complaint`; empty: all of them.
     """
 
     name: str
@@ -151,7 +151,7 @@ class ComponentDescription:
     core: tuple[str, ...] = ()
 
     def uses(self, file: str) -> bool:
-        """Return whether a file of the core, by its path there, is part of it."""
+        """Return whether a file of the core, by its path there, belongs to the component."""
         return not self.core or file.removesuffix(".c").removesuffix(".h") in self.core
 
     def variables_of(self, version: int) -> tuple[Variable, ...]:
@@ -166,7 +166,7 @@ class ComponentDescription:
         return tuple(sorted(found, key=lambda v: v.field not in shown))
 
     def _states_by_field(self) -> dict[str, str]:
-        """Return the states by where they are stored; the derivative of a displacement is where a velocity is."""
+        """Return the states by their place of storage; a velocity is stored where the displacement's derivative is."""
         states = {v.derivative for v in self.variables if v.derivative}
         return {v.field: v.name for v in self.variables if v.name in states}
 
@@ -188,14 +188,14 @@ class ComponentDescription:
         return (*self.direct_inputs(variable, version), *self.states())
 
     def direct_inputs(self, variable: Variable, version: int) -> tuple[str, ...]:
-        """Return the names of the inputs of that FMI version that an output depends on directly."""
+        """Return the names of the inputs in an FMI version that an output depends on directly."""
         inputs = {v.name for v in self.variables_of(version) if v.causality == "input"}
         return tuple(name for name in variable.dependencies or () if name in inputs)
 
     def knowns_at_start(self, variable: Variable, version: int) -> tuple[str, ...]:
         """Return the names of the knowns that an unknown of initialization may depend on.
 
-        Its inputs, and all start values but those of the other modes, masses or channels than its own.
+        These are its inputs and all start values, except those of other modes, masses or channels.
         """
 
         def may_matter(known: Variable) -> bool:
@@ -208,9 +208,9 @@ class ComponentDescription:
         return (*self.direct_inputs(variable, version), *(v.name for v in starts if may_matter(v)))
 
     def with_repeats(self, repeats: Mapping[str, int]) -> ComponentDescription:
-        """Return the component with fewer repeated blocks; the value references that stay are unchanged.
+        """Return the component with fewer repeated blocks; the remaining value references do not change.
 
-        A variable that counts such a block starts with that number, its largest value.
+        The variable that counts a block starts with the new number, which is also its maximum.
         """
         counts = {**self.repeats, **repeats}
         kept = (v for v in self.variables if not v.repeat or v.repeat_index <= counts[v.repeat])

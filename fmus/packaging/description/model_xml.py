@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0 and 3.0, which say the same in different words.
+"""modelDescription.xml of FMI 2.0 and 3.0: the same content in different words.
 
 FMI 3.0 names unknowns by their value references, FMI 2.0 by their position, counted from 1.
 """
@@ -35,9 +35,9 @@ def model_description(
 ) -> str:
     """Return a component's model description; the same component gives the same bytes.
 
-    Variables that only FMI 3.0 knows are left out for `2.0`. An edition, of an export, adds version and date, and what
-    each unknown of initialization depends on. `source_files` are C files to be named in `2.0`; FMI 3.0 has a file for
-    them.
+    `2.0` leaves out variables that only FMI 3.0 has. The edition, of an export, adds version and date, and the knowns
+    of each unknown of initialization. `source_files` are C files to list in `2.0`; FMI 3.0 lists them in a separate
+    file.
     """
     version = int(fmi[0])
     identity = {"fmiVersion": fmi, "guid" if version == 2 else "instantiationToken": component.token}
@@ -50,8 +50,8 @@ def model_description(
         "variableNamingConvention": "structured",
     }
     if edition is not None:
-        told = {"copyright": "vibroimpact developers", "generationDateAndTime": edition.date_and_time}
-        head |= {"version": edition.version, **_present(told)}
+        origin = {"copyright": "vibroimpact developers", "generationDateAndTime": edition.date_and_time}
+        head |= {"version": edition.version, **_present(origin)}
     root = Element("fmiModelDescription", identity | head)
     if version == 2 and component.model_exchange:
         root.set("numberOfEventIndicators", str(len(component.event_indicators())))
@@ -98,7 +98,7 @@ def _experiment(experiment: Experiment) -> dict[str, str]:
 
 
 def _references(component: ComponentDescription, version: int) -> dict[str, str]:
-    """Return how other elements name each variable."""
+    """Return the name by which other elements refer to each variable."""
     variables = component.variables_of(version)
     if version == 2:
         return {v.name: str(place) for place, v in enumerate(variables, 1)}
@@ -179,7 +179,7 @@ def _value_attributes(variable: Variable, references: Mapping[str, str]) -> dict
     """Return the attributes of a variable's value: declared type, unit, bounds, start, derivative."""
     attributes = {"declaredType": variable.enumeration, "unit": variable.unit}
     for key, value in (("min", variable.minimum), ("max", variable.maximum), ("start", variable.start)):
-        if value is not None:  # TOML's `1` is `1.0` for a Float64
+        if value is not None:  # TOML's `1` means `1.0` for a Float64
             attributes[key] = literal(float(value) if variable.type == "Float64" else value)
     attributes["derivative"] = references.get(variable.derivative, "")
     return _present(attributes)
@@ -204,7 +204,7 @@ def _add_structure(
         ("InitialUnknown", [v for v in variables if v.is_initial_unknown]),
         ("EventIndicator", list(component.event_indicators()) if version == 3 else []),
     ):
-        # FMI 2.0 has a list of each kind, and none that is empty
+        # FMI 2.0 has a list for each kind, and forbids empty lists
         parent = SubElement(structure, f"{kind}s") if version == 2 and unknowns else structure
         for variable in unknowns:
             unknown = SubElement(

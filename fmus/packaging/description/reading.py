@@ -1,8 +1,8 @@
-"""Reads `variables.toml`; every problem of the file is reported at once.
+"""Reading of `variables.toml`; every problem of the file is reported at once.
 
-`[component] include` names files whose units, enumerations and variables follow the component's own: what several
-components have in common is written once. There a dependency that a component does not have is left out. An enumeration
-has its `items`, or names as `laws` the C file of the contact laws: `contact_laws`.
+`[component] include` names files whose units, enumerations and variables follow the component's own; content shared by
+several components is written once there. Dependencies that a component lacks are dropped from included files. An
+enumeration has its `items`, or names as `laws` the C file of the contact laws: `contact_laws`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from vibroimpact.fmus.packaging.description.model import (
 )
 from vibroimpact.fmus.units import BASE_UNITS
 
-#: Namespace of the tokens: a uuid5 of the bytes of variables.toml in it, so equal files have equal tokens.
+#: Namespace of the tokens. A token is a uuid5 of the bytes of variables.toml: equal files have equal tokens.
 TOKEN_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "vibroimpact")
 
 TYPES = ("Float64", "Int64", "Boolean", "Enumeration")
@@ -37,14 +37,14 @@ OPTIONAL_KEYS = {
     *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports", "derivative", "event_indicator"),
 }
 PORTS = ("importer", "external")
-#: Stands in a dependency for every index of a repeated block, as `{k}` stands for the variable's own.
+#: Mark in a dependency for every index of a repeated block; `{k}` is the variable's own index.
 ALL = "{*}"
 
 
 def read_component(path: Path) -> ComponentDescription:
-    """Read one component's `variables.toml`, repeated blocks written out.
+    """Read one component's `variables.toml`, with repeated blocks written out.
 
-    ComponentFileError has all problems of the file, one a line.
+    Raise ComponentFileError with all problems of the file, one a line.
     """
     table, content = _table(path)
     included = [_table(path.parent / name) for name in table.get("component", {}).get("include", ())]

@@ -17,7 +17,7 @@ def readme_table(component: ComponentDescription) -> str:
 
 
 def with_table(readme: str, component: ComponentDescription) -> str:
-    """Return a README with its table up to date; without a pair of marker comments ComponentFileError is raised."""
+    """Return a README with its table up to date; raise ComponentFileError without a pair of marker comments."""
     before, begin, rest = readme.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):

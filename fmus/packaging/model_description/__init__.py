@@ -1,7 +1,7 @@
-"""Model descriptions of any tool: what breaks FMI's rules is graded, and mended where that changes no number.
+"""Model descriptions of any tool: violations of FMI's rules are graded, and repaired where no number changes.
 
-`amended` is pure: bytes in, bytes that FMPy reads and findings out. `schema` looks at what FMI's schema says,
-`variables` at causality, variability, start values, units and names, `structure` at ModelStructure.
+`amended` is pure: from bytes it makes bytes that FMPy reads, and findings. `schema` checks FMI's schema, `variables`
+causality, variability, start values, units and names, and `structure` ModelStructure.
 """
 
 from vibroimpact.fmus.packaging.model_description.amending import Amended, amended

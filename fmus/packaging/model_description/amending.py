@@ -1,4 +1,4 @@
-"""From the description of an FMU of any tool to one that FMPy reads, with all that is wrong in it."""
+"""Conversion of the description of any tool's FMU to one that FMPy reads, with a list of its faults."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from vibroimpact.fmus.safe_xml import root_of
 
 @dataclass(frozen=True, slots=True)
 class Amended:
-    """A description whose faults are mended, as far as they can be."""
+    """A description with its faults repaired as far as possible."""
 
     content: bytes
-    """The XML; the very bytes that were given where nothing was mended."""
+    """The XML; the original bytes if nothing was repaired."""
     findings: tuple[Finding, ...]
-    """All that is wrong with it."""
+    """All faults of the description."""
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """What has no way round; empty for a description that can be read."""
+        """Faults beyond repair; empty for a description that can be read."""
         return tuple(finding.text for finding in self.findings if finding.grade is Grade.refused)
 
 
 def amended(content: bytes, schemas: Path) -> Amended:
-    """Return a modelDescription.xml as FMPy reads it, with what was wrong in it, by FMI's schemas in `fmi2` and `fmi3`.
+    """Return a modelDescription.xml that FMPy reads, with its faults by FMI's schemas in the folders `fmi2` and `fmi3`.
 
-    No XML, a document type, or an unknown version raises ComponentFileError.
+    Raise ComponentFileError for anything but XML, for a document type, or for an unknown version.
     """
     version = root_of(content, "modelDescription.xml").get("fmiVersion", "")
     if version != "2.0" and not version.startswith("3.0"):

@@ -1,4 +1,4 @@
-"""What FMI's schema says of a description, graded: attributes and elements that nothing here reads are left out."""
+"""Errors of a description against FMI's schema, graded; attributes and elements without a use here are left out."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from vibroimpact.fmus.packaging.model_description.findings import Findings, Grad
 
 _XSD = "{http://www.w3.org/2001/XMLSchema}"
 _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
-#: Elements whose content is a tool's own.
+#: Elements whose content belongs to a tool.
 _FREE = {"VendorAnnotations", "Annotations"}
-#: Attributes that no number depends on, here or in an FMU.
+#: Attributes without influence on any number, here or in an FMU.
 INCONSEQUENTIAL = {
     *("modelName", "description", "author", "version", "copyright", "license", "generationTool", "quantity"),
     *("generationDateAndTime", "variableNamingConvention", "displayUnit", "nominal", "unbounded"),
     *("relativeQuantity", "startTime", "stopTime", "dependenciesKind", "numberOfEventIndicators"),
 }
-#: Attributes that can be read as if they were not there; what that assumes is said.
+#: Attributes that can be ignored; the finding states what is assumed then.
 DISPENSABLE = {
     *("min", "max", "start", "unit", "tolerance", "stepSize", "dependencies", "variability", "initial"),
     *("reinit", "derivative", "fixedInternalStepSize", "maxOutputDerivativeOrder"),
     "recommendedIntermediateInputSmoothness",
 }
-#: Children of the root that are read wherever they stand.
+#: Children of the root that are accepted at any place.
 _ANYWHERE = {
     *("UnitDefinitions", "TypeDefinitions", "LogCategories", "DefaultExperiment"),
     *("ModelExchange", "CoSimulation", "ScheduledExecution"),
 }
-#: Rounds of the schema, in each of which elements may be left out; errors that are graded one by one.
+#: Rounds of validation, in each of which elements may be left out; errors that are graded one by one.
 _MOST_ROUNDS, _MOST_ERRORS = 20, 1000
-#: Children of an element that the schema is shown at a time.
+#: Number of an element's children that the schema checks at a time.
 _WINDOW = 500
-#: Refusals that are told, and characters of a name that is compared with the schema's or of a value that is repeated.
-_MOST_TOLD, _LONGEST = 10, 80
+#: Number of refusals in the answer; characters of a name for comparison with the schema, or of a quoted value.
+_MOST_REFUSALS, _LONGEST = 10, 80
 _BOOLEAN = "'xs:boolean'"
 _ATTRIBUTE = re.compile(r"attribute '([^']+)'")
 
 
 def amend_by_schema(root: Any, version: str, schemas: Path, findings: Findings) -> None:
-    """Amend a description, in place, until the schema of its version takes it, or add why it is refused."""
+    """Amend a description, in place, until the schema of its version accepts it, or add the reasons of its refusal."""
     folder = schemas / f"fmi{version[0]}"
     _drop_annotations(root)
     _drop_unknown_attributes(root, version, folder, findings)
@@ -54,7 +54,7 @@ def amend_by_schema(root: Any, version: str, schemas: Path, findings: Findings) 
 
 
 def build_problems(content: bytes, schemas: Path) -> tuple[str, ...]:
-    """Return what FMI 3.0's schema says against a `sources/buildDescription.xml`, which no run looks at."""
+    """Return the errors of a `sources/buildDescription.xml` against FMI 3.0's schema; no run uses this file."""
     try:
         root = etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
     except etree.XMLSyntaxError as error:
@@ -62,7 +62,7 @@ def build_problems(content: bytes, schemas: Path) -> tuple[str, ...]:
     schema = _schema(schemas / "fmi3", "BuildDescription")
     if schema.validate(root):
         return ()
-    return tuple(f"line {e.line}: {_cut_message(e.message)}" for e in list(schema.error_log)[:_MOST_TOLD])
+    return tuple(f"line {e.line}: {_cut_message(e.message)}" for e in list(schema.error_log)[:_MOST_REFUSALS])
 
 
 @cache
@@ -77,14 +77,14 @@ def _names(folder: Path, kind: str) -> frozenset[str]:
 
 
 def _drop_annotations(root: Any) -> None:
-    """Leave out what is a tool's own: FMI's schema takes one element of it, and tools write several."""
+    """Remove the content of annotations: FMI's schema allows one element there, and tools write several."""
     for element in list(root.iter(*_FREE)):
         if element.getparent() is not None:
             element.getparent().remove(element)
 
 
 def _drop_unknown_attributes(root: Any, version: str, folder: Path, findings: Findings) -> None:
-    """Leave out attributes of no name of the schema, which lets some pass whatever their spelling."""
+    """Remove attributes with names unknown to the schema, which lets some pass in any spelling."""
     known = _names(folder, "attribute")
     for element in root.iter(etree.Element):
         for name in [name for name in element.attrib if name not in known and not name.startswith(_XSI)]:
@@ -97,7 +97,7 @@ def _drop_unknown_attributes(root: Any, version: str, folder: Path, findings: Fi
 
 @lru_cache(maxsize=1024)
 def _nearest(name: str, known: frozenset[str]) -> str:
-    """Return the nearest of the known names, 2 ms of processor; empty where none is near."""
+    """Return the nearest of the known names, in 2 ms of processor time; empty if none is near."""
     return next(iter(difflib.get_close_matches(name, known, n=1)), "")
 
 
@@ -106,9 +106,9 @@ def _cut(text: str) -> str:
 
 
 def _windows(root: Any) -> Generator[None, None, None]:
-    """Leave a few children of each name at a time to elements of many; one of them is with the next ones, too.
+    """Show a few children of each name at a time in large elements; each window begins with the last of the one before.
 
-    The library goes through all children before the one of an error: 100,000 errors would take minutes.
+    The library walks through all children before the child of an error: 100,000 errors would take minutes.
     """
     many = [_Children(one) for one in root.iter(etree.Element) if len(one) > _WINDOW]
     try:
@@ -122,7 +122,7 @@ def _windows(root: Any) -> Generator[None, None, None]:
 
 
 class _Children:
-    """The children of an element by name: those of few stay, since the schema may require them."""
+    """The children of an element by name; few children of a name always stay, since the schema may require them."""
 
     def __init__(self, parent: Any) -> None:
         self._parent, self._all = parent, list(parent)
@@ -133,7 +133,7 @@ class _Children:
         self.most = max(map(len, self._places))
 
     def show(self, first: int) -> None:
-        """Leave the children from a number on, in their order."""
+        """Show the children from a number on, in their order."""
         shown: list[int] = []
         for places in self._places:
             few = len(places) <= _WINDOW
@@ -146,7 +146,7 @@ class _Children:
 
 
 class _Amendments:
-    """What is changed in a description until the schema takes it."""
+    """Changes to a description until the schema accepts it."""
 
     def __init__(self, root: Any, folder: Path, findings: Findings) -> None:
         self._root, self._folder, self._findings = root, folder, findings
@@ -154,7 +154,7 @@ class _Amendments:
         self._accepted: set[str] = set()
 
     def make(self) -> None:
-        """Amend the description; what cannot be amended is refused."""
+        """Amend the description; refuse the faults that cannot be amended."""
         for _ in range(_MOST_ROUNDS):
             errors = self._errors()
             left = [error for error, element in errors if not self._amend(error, element)]
@@ -162,12 +162,12 @@ class _Amendments:
                 break
         else:
             left = [error for error, _ in self._errors()]
-        for error in left[:_MOST_TOLD]:
+        for error in left[:_MOST_REFUSALS]:
             self._findings.add(Grade.refused, f"line {error.line}: {_cut_message(error.message)}")
         self._root.extend(self._moved)
 
     def _errors(self) -> list[tuple[Any, Any]]:
-        """Return errors with their elements, before any of these is taken out: places change then."""
+        """Return errors with their elements, before any element is removed: removals change the places."""
         schema = _schema(self._folder)
         found: dict[tuple[Any, str, int], tuple[Any, Any]] = {}
         with closing(_windows(self._root)) as windows:
@@ -183,12 +183,12 @@ class _Amendments:
         return list(found.values())[:_MOST_ERRORS]
 
     def _element(self, error: Any) -> Any:
-        """Return the element that an error is about; None where the schema does not say it."""
+        """Return the element of an error; None if the schema does not name it."""
         found = self._root.getroottree().xpath(error.path) if error.path else []
         return found[0] if found else None
 
     def _amend(self, error: Any, element: Any) -> bool:
-        """Amend what one error is about; return whether that can be done."""
+        """Amend the fault behind one error; return whether that was possible."""
         attribute = _ATTRIBUTE.search(error.message)
         if element is None:
             return False
@@ -199,7 +199,7 @@ class _Amendments:
         return self._drop_attribute(error, element, attribute[1])
 
     def _accept_missing(self, error: Any, element: Any, name: str) -> bool:
-        """Accept that an attribute is not there: nothing needs it, or an error before was about it."""
+        """Accept a missing attribute that nothing needs, or that an earlier error was about."""
         if "is required but missing" not in error.message:
             return True
         if name not in INCONSEQUENTIAL:
@@ -227,11 +227,11 @@ class _Amendments:
         return True
 
     def _amend_element(self, error: Any, element: Any) -> bool:
-        """Leave out an element that FMI does not know; take one that stands elsewhere from there at the end."""
+        """Remove an element unknown to FMI; collect a misplaced one, to be put in its place at the end."""
         tag = str(element.tag)
         if "This element is not expected" not in error.message or element is self._root:
             return False
-        if element.getparent() is None:  # taken out already
+        if element.getparent() is None:  # removed before
             return True
         if element.getparent() is self._root and tag in _ANYWHERE and tag not in {e.tag for e in self._moved}:
             self._moved.append(element)

@@ -1,4 +1,4 @@
-"""ModelStructure of a description: outputs, derivatives and unknowns of initialization, and on what they depend."""
+"""ModelStructure of a description: outputs, derivatives and unknowns of initialization, and their dependencies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from vibroimpact.fmus.packaging.model_description.findings import Findings, Grade, listed
 from vibroimpact.fmus.packaging.model_description.variables import Variable
 
-#: Where each version lists its unknowns.
+#: Place of the lists of unknowns in each version.
 _PLACES = {
     2: {
         "outputs": "Outputs/Unknown",
@@ -26,9 +26,9 @@ _PLACES = {
 
 
 def amend_structure(root: Any, variables: list[Variable], major: int, findings: Findings) -> None:
-    """Amend, in place, the ModelStructure of a description that the schema takes, and the derivatives of its variables.
+    """Amend, in place, the ModelStructure of a schema-valid description, and the derivatives of its variables.
 
-    The variables are amended already.
+    The variables must be amended before.
     """
     structure = _Structure(root, variables, major, findings)
     structure.amend_derivatives()
@@ -52,7 +52,7 @@ class _Structure:
         return None if number is None else self._by_reference.get(number)
 
     def amend_derivatives(self) -> None:
-        """Leave out derivatives of variables that are not there."""
+        """Remove references to derivatives of variables that do not exist."""
         for variable in self._variables:
             reference = variable.value.get("derivative")
             if reference is not None and self._named(reference) is None:
@@ -61,7 +61,7 @@ class _Structure:
                 self._findings.add(Grade.remark, text, variable.name)
 
     def unknowns(self, place: str) -> Iterator[Variable]:
-        """Yield the variables that a part of ModelStructure lists; entries of no variable are left out."""
+        """Yield the variables that a part of ModelStructure lists; entries without a variable are removed."""
         for element in self._root.findall(f"ModelStructure/{place}"):
             variable = self._named(element.get("index" if self._major == 2 else "valueReference", ""))
             if variable is None:
@@ -86,7 +86,7 @@ class _Structure:
             self._findings.add(Grade.remark, text, variable.name)
 
     def look_at_outputs(self, found: Iterable[Variable]) -> None:
-        """Say which outputs ModelStructure lacks, and what else it has among them."""
+        """Add findings for outputs missing in ModelStructure, and for other variables listed there."""
         there = [v.name for v in found]
         expected = [v.name for v in self._variables if v.causality == "output"]
         if lacking := _without(expected, there):
@@ -98,7 +98,7 @@ class _Structure:
             )
 
     def look_at_initial_unknowns(self, found: Iterable[Variable], derivatives: Iterable[Variable]) -> None:
-        """Say which unknowns of initialization are lacking, and which are none."""
+        """Add findings for missing unknowns of initialization, and for other variables listed there."""
         there = [v.name for v in found]
         expected = [v.name for v in self._variables if _is_unknown(v)]
         for derivative in derivatives:
@@ -131,7 +131,7 @@ def _without(names: Iterable[str], others: Iterable[str]) -> list[str]:
 
 
 def _plain_number(text: str) -> str | None:
-    """Return a reference without blanks and leading zeros; None of what is none, or longer than any."""
+    """Return a reference without blanks and leading zeros; None for anything else, or a longer one than any valid."""
     digits = text.strip()
     number = digits.lstrip("0") or digits[:1]
     return number if digits.isdecimal() and len(number) <= 20 else None

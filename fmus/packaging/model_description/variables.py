@@ -1,4 +1,4 @@
-"""Variables of a description: what FMI does not allow of them is graded, and read as what it can only mean."""
+"""Variables of a description: violations of FMI's rules are graded, and read in their only sensible meaning."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ REAL_TYPES = {"Real", "Float32", "Float64"}
 _PARAMETERS = ("parameter", "calculatedParameter", "structuralParameter")
 #: FMI's default of `initial` by causality and variability; a structural parameter is a parameter.
 _INITIAL = DEFAULT_INITIAL | {("structuralParameter", v): "exact" for v in ("fixed", "tunable")}
-#: What `initial` may be where it is written, by its default.
+#: Values that `initial` may have in a description, by its default.
 _CHOICES = {"calculated": {"calculated", "approx"}, "exact": {"exact"}, None: {"exact"}}
-#: Units that many a tool writes of a number without one, and defines nowhere.
+#: Units that many tools write for a number without a unit, and never define.
 _NO_UNITS = {"", "-", "1"}
 
 _NONDIGIT = r"[A-Za-z_]"
@@ -29,9 +29,9 @@ STRUCTURED_NAME = re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\)")
 
 @dataclass(slots=True)
 class Variable:
-    """A variable as its elements say it: `element` has its name, `value` its type and its start value.
+    """A variable by its elements: `element` holds its name, `value` its type and its start value.
 
-    In FMI 3.0 both are one. `variability` and `initial` hold FMI's default where the description says nothing.
+    In FMI 3.0 both are the same element. `variability` and `initial` hold FMI's default where the description has none.
     """
 
     element: Any
@@ -45,12 +45,12 @@ class Variable:
 
     @property
     def reference(self) -> str:
-        """Its value reference."""
+        """Value reference of the variable."""
         return str(self.element.get("valueReference", ""))
 
 
 def variables_of(root: Any, major: int) -> list[Variable]:
-    """Return the variables of a description that the schema takes."""
+    """Return the variables of a schema-valid description."""
     return [
         _variable(element, major) for element in root.iterfind("ModelVariables/*") if "name" in element.attrib
     ]
@@ -76,7 +76,7 @@ def _default_variability(major: int, causality: str, kind: str) -> str:
 
 
 def amend_variables(root: Any, variables: list[Variable], findings: Findings) -> None:
-    """Amend, in place, the variables of a description that the schema takes."""
+    """Amend, in place, the variables of a schema-valid description."""
     types = _types(root)
     for variable in variables:
         _amend_type(variable, types, findings)
@@ -90,7 +90,7 @@ def amend_variables(root: Any, variables: list[Variable], findings: Findings) ->
 
 
 def _types(root: Any) -> dict[str, Any]:
-    """Return the element of each declared type with its attributes."""
+    """Return the elements with the attributes of each declared type."""
     found = {}
     for element in root.iterfind("TypeDefinitions/*"):
         found[element.get("name")] = element[0] if element.tag == "SimpleType" and len(element) else element
@@ -122,7 +122,7 @@ def _amend_variability(variable: Variable, findings: Findings) -> None:
     variable.element.set("variability", variable.variability)
     if "initial" not in variable.element.attrib:
         variable.initial = _INITIAL[causality, variable.variability]
-    # an FMU may lose what is set while it runs of an input that it says to be fixed
+    # an FMU may ignore values set during a run for an input that it declares fixed
     grade = Grade.doubt if causality == "input" and written and got != "continuous" else Grade.remark
     text = (
         f"expected a variability that FMI allows of a {causality} of type {variable.type}, got "
@@ -149,13 +149,13 @@ def _amend_initial(variable: Variable, findings: Findings) -> None:
     variable.initial = default
     settable = variable.causality in ("parameter", "structuralParameter")
     meant = "Read as exact: a value that is given to it may be lost." if settable else "It is not looked at."
-    beside = f"causality {variable.causality} and variability {variable.variability}"
-    text = f"expected no initial = {written} beside {beside}."
+    properties = f"causality {variable.causality} and variability {variable.variability}"
+    text = f"expected no initial = {written} beside {properties}."
     findings.add(Grade.doubt if settable else Grade.remark, f"{text} {meant}", variable.name)
 
 
 def _start(variable: Variable) -> tuple[Any, str | None]:
-    """Return the element that holds the start value, and the value; FMI 3.0 has one of its own for text."""
+    """Return the element with the start value, and the value; text has an element of its own in FMI 3.0."""
     if variable.major == 3 and variable.type in ("Binary", "String"):
         element = variable.element.find("Start")
         return element, None if element is None else element.get("value")
@@ -200,7 +200,7 @@ def _amend_units(root: Any, variables: list[Variable], types: dict[str, Any], fi
 
 
 def _amend_unit(variable: Variable, holder: Any, unknown: list[str], findings: Findings) -> None:
-    """Take out a unit that means none; read another that is not defined as a name alone."""
+    """Remove a unit that means no unit; treat another undefined unit as a mere name."""
     unit = holder.get("unit")
     got = f"expected a unit that is defined, got {unit[:LONGEST_NAME]!r}."
     if unit.strip() in _NO_UNITS:
@@ -251,7 +251,7 @@ def _look_at_names(root: Any, variables: list[Variable], findings: Findings) -> 
 
 
 def _look_at_references(variables: list[Variable], findings: Findings) -> None:
-    """In FMI 3.0 a value reference is of one variable, and one variable is the time."""
+    """Add findings for value references shared in FMI 3.0, and for a number of times other than one."""
     seen: set[str] = set()
     for variable in variables:
         if variable.reference in seen:

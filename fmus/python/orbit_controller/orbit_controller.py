@@ -1,6 +1,6 @@
 """The FMU that keeps an unstable orbit by small changes of a forcing amplitude; pythonfmu runs it.
 
-It must run wherever the FMU runs: standard library and pythonfmu only, nothing of vibroimpact.
+It must run wherever the FMU runs: it imports only the standard library and pythonfmu, nothing of vibroimpact.
 """
 
 import json
@@ -25,30 +25,30 @@ from pythonfmu.enums import (  # type: ignore[import-untyped, import-not-found, 
 
 PLAN_FILE = "plan.json"
 TURN = 2.0 * math.pi
-#: Forcing periods by which a flight may be longer or shorter than the orbit's, or its impact off the orbit's phase.
-LOST = 0.25
-#: Standard deviations of the noise in a difference of two speeds that is taken for none.
-NOISES = 4.0
+#: Deviation of a flight's duration, or of an impact's phase, from the orbit's, beyond which the orbit is lost; periods.
+LARGEST_DEVIATION = 0.25
+#: Difference of two speeds below which they count as equal, in standard deviations of the noise.
+NOISE_DEVIATIONS = 4.0
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What an impact was, and what was decided at it.
+    """An impact, and the decision taken at it.
 
     Attributes
     ----------
     time, phase, velocity : float
-        Of the impact: s, rad, m/s as measured.
+        Time, phase and measured speed of the impact: s, rad, m/s.
     row : int
-        Of the plan, from 0.
+        Row of the plan, from 0.
     flights : int
-        Since this row is in force.
+        Flights since this row began.
     correction : float
-        Of the forcing amplitude, N.
+        Correction of the forcing amplitude, N.
     offset : tuple of float
-        Of the orbit that was located from that of the plan: s, m/s.
+        Difference of the located orbit from the plan's: s, m/s.
     kept : bool
-        Whether the orbit has not been lost.
+        Whether the orbit is still kept.
     """
 
     time: float
@@ -62,7 +62,7 @@ class Decision:
 
 
 class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no types, and is not everywhere
-    """Answers the force of the next flight, as soon as an impact is told."""
+    """Slave that answers the force of the next flight, as soon as the inputs report an impact."""
 
     description = "Keeps an unstable periodic orbit by the forcing amplitude while its frequency changes"
 
@@ -78,7 +78,7 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
         self.limit: float = plan["limit"]
         self.noise, self.seed, self.active = 0.0, 1, True
         self._inputs = {"count": 0, "last_time": 0.0, "last_phase": 0.0, "last_velocity": 0.0}
-        # by number of impact: a step that is taken back and made again decides again
+        # by number of impact: a step that is repeated decides again
         self._decisions: dict[int, Decision] = {}
         self._register()
 
@@ -87,16 +87,16 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
             "count": (Integer, Fmi2Variability.discrete, "Number of impacts of the body"),
             "last_time": (Real, Fmi2Variability.continuous, "Time of the last impact"),
             "last_phase": (Real, Fmi2Variability.continuous, "Forcing phase of the last impact"),
-            "last_velocity": (Real, Fmi2Variability.continuous, "Speed towards the stop before it"),
+            "last_velocity": (Real, Fmi2Variability.continuous, "Speed before the last impact"),
         }
         for name, (kind, variability, text) in inputs.items():
             self._register_input(name, kind, variability, text)
         outputs = {
             "forcing_amplitude": (Real, "Amplitude of the force until the next impact", self._force),
-            "forcing_angular_frequency": (Real, "Angular frequency until then", self._frequency),
-            "correction": (Real, "Of the amplitude", lambda: self._decided().correction),
-            "row": (Integer, "Row of the plan that is in force, from 0", lambda: self._decided().row),
-            "kept": (Boolean, "Whether the orbit has not been lost", lambda: self._decided().kept),
+            "forcing_angular_frequency": (Real, "Angular frequency until the next impact", self._frequency),
+            "correction": (Real, "Correction of the amplitude", lambda: self._decided().correction),
+            "row": (Integer, "Present row of the plan, from 0", lambda: self._decided().row),
+            "kept": (Boolean, "Whether the orbit is still kept", lambda: self._decided().kept),
         }
         for name, (kind, text, getter) in outputs.items():
             variability = Fmi2Variability.continuous if kind is Real else Fmi2Variability.discrete
@@ -111,11 +111,11 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
                 )
             )
         parameters = {
-            "tolerance": (Real, "Difference of two speeds in a row at which the plan goes on"),
+            "tolerance": (Real, "Difference of two successive speeds below which the next row begins"),
             "limit": (Real, "Largest correction of the amplitude"),
-            "noise": (Real, "Standard deviation of the error of measured speeds, relative"),
-            "seed": (Integer, "Of the noise"),
-            "active": (Boolean, "Whether the amplitude is corrected at all"),
+            "noise": (Real, "Relative standard deviation of the error of measured speeds"),
+            "seed": (Integer, "Seed of the noise"),
+            "active": (Boolean, "Whether the amplitude is corrected"),
         }
         for name, (kind, text) in parameters.items():
             self.register_variable(
@@ -142,7 +142,7 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
         self.register_variable(variable)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Do nothing: all is decided at impacts."""
+        """Do nothing: all decisions are taken at impacts."""
         return True
 
     def _force(self) -> float:
@@ -176,7 +176,7 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
             kept = kept and self._is_orbit(before, time, phase)
             if self._locates:
                 offset = self._located(before, phase, velocity)
-            still = max(self.tolerance, NOISES * self.noise * velocity)
+            still = max(self.tolerance, NOISE_DEVIATIONS * self.noise * velocity)
             settled = flights >= self._stay and abs(velocity - before.velocity) < still
             if kept and settled and row + 1 < len(self._rows):
                 row, flights = row + 1, 0
@@ -191,7 +191,7 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
         return Decision(time, phase, velocity, row, flights, correction, offset, kept)
 
     def _away(self, row: int, phase: float, velocity: float) -> tuple[float, float]:
-        """Return how far an impact is from the orbit of the plan: s, m/s."""
+        """Return the difference of an impact from the plan's orbit: s, m/s."""
         orbit = self._rows[row]
         turned = math.remainder(phase - orbit["phase"], TURN)
         return turned / orbit["angular_frequency"], velocity - orbit["velocity"]
@@ -200,10 +200,10 @@ class OrbitController(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no
         orbit = self._rows[before.row]
         periods = (time - before.time) * orbit["angular_frequency"] / TURN
         turned = math.remainder(phase - orbit["phase"], TURN) / TURN
-        return abs(periods - self._periods) < LOST and abs(turned) < LOST
+        return abs(periods - self._periods) < LARGEST_DEVIATION and abs(turned) < LARGEST_DEVIATION
 
     def _located(self, before: Decision, phase: float, velocity: float) -> tuple[float, float]:
-        """Return the fixed point by one step of Newton's method, from where the last flight began and ended.
+        """Return the fixed point by one step of Newton's method, from the start and the end of the last flight.
 
         z = z* + J (z0 - z*) + b (F - F*)  solved for z*, all relative to the plan's orbit.
         """

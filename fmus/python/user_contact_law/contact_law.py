@@ -1,4 +1,4 @@
-"""A contact law of one's own: copy this file, change the function, make it an FMU.
+"""A contact law of your own: copy this file, change the function, make it an FMU.
 
 vibroimpact.fmus.packaging.python_fmus.build_user_contact_law("contact_law.py", "my_law.fmu")
 """

@@ -1,6 +1,6 @@
-"""The FMU around a user's contact law; pythonfmu runs it. Users write `contact_law.py` beside it, not this.
+"""The FMU around a user's contact law; pythonfmu runs it. Users write `contact_law.py`, not this file.
 
-It must run wherever the FMU runs: standard library and pythonfmu only, nothing of vibroimpact.
+It must run wherever the FMU runs: it imports only the standard library and pythonfmu, nothing of vibroimpact.
 """
 
 import ctypes
@@ -29,7 +29,7 @@ Law = Callable[[float, float], float]
 
 
 class UserContactLaw(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no types, and is not everywhere
-    """Answers the coefficient of restitution for the present inputs, as soon as they are set."""
+    """Slave that answers the coefficient of restitution for the present inputs, as soon as they are set."""
 
     description = "A stop that answers a body's contact by a law written in Python"
 
@@ -38,7 +38,7 @@ class UserContactLaw(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no 
         self._law = load_law(Path(self.resources, LAW_FILE))
         self._inputs = {"displacement": 0.0, "velocity": 0.0}
         self._answer: float | None = None
-        # inputs are set and outputs read through functions: outputs answer at once, with no step between
+        # functions set inputs and read outputs: outputs answer at once, without a step in between
         self._register_input("displacement", "Displacement of the body's contact point")
         self._register_input(
             "velocity", "Velocity of the body's contact point before the contact; its sign does not matter"
@@ -47,11 +47,11 @@ class UserContactLaw(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no 
             "applied_restitution", "The answer: coefficient of restitution for these inputs", self.restitution
         )
         self._register_output("applied_force", "Force on the body: 0, the law is impulsive", lambda: 0.0)
-        # a mistake in the law is told when the FMU is made, not at the first impact
+        # a mistake in the law shows when the FMU is made, not at the first impact
         answer(self._law, 0.0, TRIAL_VELOCITY)
 
     def restitution(self) -> float:
-        """Return the law's answer: asked for once each time the inputs are set, however often it is read."""
+        """Return the law's answer, computed once each time the inputs are set, for any number of reads."""
         if self._answer is None:
             velocity = abs(self._inputs["velocity"])
             try:
@@ -62,8 +62,8 @@ class UserContactLaw(Fmi2Slave):  # type: ignore[misc, unused-ignore]  # has no 
         return self._answer
 
     def _survive_an_exception(self) -> None:
-        # when it reports an exception, pythonfmu 0.7 gives back its references to these, but uses them again:
-        # without one more of each, a later call or the end of the instance crashes the process
+        # pythonfmu 0.7 releases its references to these objects when it reports an exception, but uses the objects
+        # again. One more reference to each keeps a later call, or the end of the instance, from crashing the process.
         for kept in (self, type(self), self.log_queue):
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
 
@@ -106,7 +106,7 @@ def load_law(path: Path) -> Law:
     ValueError
         The file cannot be run, or has no such function.
     """
-    # by path and under no name: two such FMUs in one process must not get each other's law
+    # by path and without a module name: two such FMUs in one process must not get each other's law
     spec = importlib.util.spec_from_file_location("user_contact_law_file", path)
     if spec is None or spec.loader is None:
         raise ValueError(f"{path.name}: expected a Python file, got none.")
@@ -128,7 +128,7 @@ def answer(law: Law, displacement: float, velocity: float) -> float:
     Raises
     ------
     ValueError
-        The law failed, or its answer is no number from 0 to 1; the message says for which inputs and where.
+        The law failed, or its answer is not a number from 0 to 1; the message names the inputs and the line.
     """
     call = f"contact_law({displacement:.6g}, {velocity:.6g})"
     try:

@@ -19,7 +19,7 @@ IN_PYTHON = {words: one for words, one in OPERATIONS.items() if one.door is not 
 
 
 def form(field: Field) -> str:
-    """Return an argument as a signature in Python has it; empty where it is none there."""
+    """Return an argument in the form of a Python signature; empty if the function does not have it."""
     if field.words.python is not None:
         return field.words.python
     kind = field.type.__name__ if inspect.isclass(field.type) else str(field.type)

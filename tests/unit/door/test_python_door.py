@@ -1,4 +1,4 @@
-"""`import vibroimpact as vi`: what is there, what it loads, and that it does what the commands do."""
+"""`import vibroimpact as vi`: its names, its imports, and its agreement with the commands."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ FORCED = {
 
 
 def declared() -> dict[str, str]:
-    """Return what type checkers see: each name with the module it comes from."""
+    """Return the names for type checkers: each name with its module."""
     found = {}
     for node in ast.walk(ast.parse(DOOR.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("vibroimpact"):
@@ -97,7 +97,7 @@ def test_the_page_of_the_door_runs_and_has_every_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     stop_the_clock(monkeypatch)
-    # the page says which effect is the dearest
+    # the page names the most expensive effect
     monkeypatch.setattr(StillClock, "processor_time", Clock.processor_time)
     failed, tried = doctest.testfile(
         str(page), module_relative=False, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -114,7 +114,7 @@ def test_a_run_in_memory_is_that_of_the_file(tmp_path):
     same(written, open_dataset(tmp_path / "run.nc"))
     assert found.sizes["angular_frequency"] == 2
     assert found.encoding == {}
-    # it saves and opens as any other
+    # it saves and opens like any other dataset
     found.to_netcdf(tmp_path / "again.nc")
     assert vi.open_dataset(tmp_path / "again.nc").outcome.values.tolist() == [0, 0]
 
@@ -202,7 +202,7 @@ def test_figures_go_into_axes_that_are_there():
     assert vi.figures.draw_into(axes[0, 1], single, "portrait") is axes[0, 1]
     assert axes[0, 1].get_xlabel() == "displacement (-)"
     assert not axes[1, 1].lines
-    # afterwards a figure is its own again, and a notebook shows it
+    # the next figure is independent again, and a notebook shows it
     assert vi.draw(swept)._repr_png_().startswith(b"\x89PNG")
     for given, words in (
         (axes[0, 0], "expected 2 for the panels of this figure, got 1"),
@@ -302,7 +302,7 @@ WRITERS = {
     "an FMU": lambda read, path: vi.export_fmu(read / "scene.toml", path),
     "a system": lambda read, path: vi.export_ssp(read / "scene.toml", path),
 }
-"""Calls that write a file, by what they are."""
+"""Calls that write a file, by their names."""
 READ = {
     "replay": ("replayed.toml", "hit.nc"),
     "replay of the scene's own": ("named.toml", "hit.nc"),
@@ -314,7 +314,7 @@ READ = {
 
 @pytest.fixture
 def read(tmp_path, monkeypatch):
-    """Return a folder of scenes and recordings where nothing that is simulated ends well."""
+    """Return a folder of scenes and recordings in which every simulation fails."""
     let_nothing_run(monkeypatch)
     (tmp_path / "scene.toml").write_text(vi.Scene.from_dict(FORCED).to_toml())
     (tmp_path / "replayed.toml").write_text(BOARD)

@@ -1,4 +1,4 @@
-"""Whatever the door returns, `vi.draw` draws: datasets of each kind, lists of orbits and of classes."""
+"""`vi.draw` draws every result of the door: datasets of each kind, lists of orbits and of classes."""
 
 from __future__ import annotations
 

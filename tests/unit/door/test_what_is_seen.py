@@ -1,4 +1,4 @@
-"""What completion, `help()`, `inspect.signature` and `--help` see is what they saw: two files hold it."""
+"""Completion, `help()`, `inspect.signature` and `--help` show unchanged texts, kept in two files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a process that reads files of strangers cannot do, whatever a file has made of it."""
+"""Limits of a process that reads untrusted files, whatever a file has made of the process."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ print(json.dumps(found))
 
 
 def tried(folder: Path, landlock: bool) -> dict[str, str]:
-    """Return by what each attempt of a confined process failed; empty where it did not."""
+    """Return the error of each attempt of a confined process; empty for an attempt that succeeded."""
     (folder / "old").write_text("kept")
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = str(server.getsockname()[1])
         how = "landlock" if landlock else "without"
         command = python_command("-c", TRIES, str(folder), port, how)
         done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    if not done.stdout:  # it became the program that it started
+    if not done.stdout:  # it was replaced by the program that it started
         assert not landlock, done.stderr
         return {"start": ""}
     found: dict[str, str] = json.loads(done.stdout)
@@ -74,7 +74,7 @@ def tried(folder: Path, landlock: bool) -> dict[str, str]:
 
 
 def landlock_version() -> int:
-    """Return the version of landlock on this machine, found in a process of its own."""
+    """Return the version of landlock on this machine, found in a separate process."""
     code = "from vibroimpact.fmus.confinement import *; print(forbid_writing_and_network())"
     done = subprocess.run(python_command("-c", code), capture_output=True, text=True, timeout=120, check=True)
     return int(done.stdout)

@@ -1,4 +1,4 @@
-"""Tables in HTML hold what they were given, and nothing of it is markup."""
+"""HTML tables hold their contents unchanged, and no content is markup."""
 
 from __future__ import annotations
 

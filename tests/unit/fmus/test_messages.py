@@ -1,4 +1,4 @@
-"""A message keeps both spellings of its arguments, whatever is put round it and wherever it goes."""
+"""A message keeps both spellings of its arguments when it is extended, wrapped or sent to another process."""
 
 from __future__ import annotations
 

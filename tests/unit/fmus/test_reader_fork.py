@@ -1,4 +1,4 @@
-"""A fork of this process reads files: nothing is imported again, and nothing is left behind."""
+"""A fork of this process reads files: it needs no imports, and leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ORDER = Order("reader:read", "/file", {}, 10.0, 1 << 30, most_bytes=1 << 20)
 
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Answer | None]:
-    """Return how a fork of this process reads a file by a function of a test."""
+    """Return a function that lets a fork of this process read a file by a reader of the test."""
 
     def set_up(what: Callable[[str, dict[str, Any]], Any], **changes: Any) -> Answer | None:
         module = ModuleType("reader")
@@ -76,7 +76,7 @@ def ends(number: int) -> Callable[[str, dict[str, Any]], None]:
         (ends(signal.SIGSEGV), "died", "11"),
         (ends(signal.SIGPROF), "late", "27"),
         (lambda path, options: os._exit(0), "died", ""),
-        (lambda path, options: (None, [bytes(2_000_000)]), "died", None),  # more than was asked for
+        (lambda path, options: (None, [bytes(2_000_000)]), "died", None),  # more than the order allows
         (lambda path, options: os.write(3, b"[" * 9_000 + b"\n") and signal.pause(), "died", None),
         (lambda path, options: bytearray(1 << 31), "raised", "MemoryError"),
         (lambda path, options: sys.exit(3), "raised", "SystemExit"),
@@ -92,7 +92,7 @@ def test_whatever_a_file_does_to_it_is_an_answer(
 
 
 def test_what_this_process_has_not_freed_yet_is_not_freed_in_a_fork(read: Callable[..., Answer]) -> None:
-    """An object that was freed there, whose files and threads a fork lacks, has crashed it before it began to read."""
+    """Freeing such an object in a fork, which lacks its files and threads, crashed the fork before it read."""
     here = os.getpid()
 
     class Held:
@@ -122,7 +122,7 @@ def test_a_loop_that_does_not_end_is_late(
 def test_a_fork_that_waited_says_nothing_of_the_file(
     read: Callable[..., Answer | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The time of its limits may pass without any work, on a machine that does not let it compute."""
+    """The time limits may pass without any work, on a machine that is too busy to let it compute."""
     assert read(lambda path, options: time.sleep(60), seconds=0.03) is None
     monkeypatch.setattr(reader_fork, "GRACE", 0.0)
     monkeypatch.setattr(reader_fork, "PATIENCE", 1.0)
@@ -137,16 +137,16 @@ def test_a_fork_that_waits_for_a_lock_of_a_lost_thread_is_given_up(
     monkeypatch.setattr(reader_fork, "PATIENCE_WITH_SLEEP", 0.5)
     lock = threading.Lock()
     with lock:
-        asked = time.monotonic()
+        began = time.monotonic()
         assert read(lambda path, options: lock.acquire(), seconds=100.0) is None
-    assert time.monotonic() - asked < 60.0
+    assert time.monotonic() - began < 60.0
 
 
 def test_a_fork_that_computes_or_answers_slowly_is_not_given_up(
     read: Callable[..., Answer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reader_fork, "PATIENCE_WITH_SLEEP", 0.1)
-    monkeypatch.setattr(reader_fork, "_GLANCE", 0.02)
+    monkeypatch.setattr(reader_fork, "_WATCH_INTERVAL", 0.02)
 
     def work(path: str, options: dict[str, Any]) -> tuple[None, list[bytes]]:
         until = time.process_time() + 0.5

@@ -1,4 +1,4 @@
-"""The process that reads files of strangers: what it answers is bounded, and never a pickle."""
+"""The process that reads untrusted files: its answers are bounded, and never a pickle."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_more_bytes_than_were_asked_for_are_no_answer(reader: Callable[[str], Re
 def test_an_answer_that_is_none_of_ours_is_a_file_that_crashes_its_reader(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: bytes
 ) -> None:
-    """A file may have taken the process over: it then says what it likes."""
+    """A file may have taken over the process, which then sends anything."""
     child = tmp_path / "child.py"
     child.write_text(
         f"import sys; sys.stdin.readline(); sys.stdout.buffer.write({answer!r}); sys.stdout.buffer.flush()"

@@ -1,4 +1,4 @@
-"""Text of strangers on the terminal: escapes are seen, not obeyed."""
+"""Untrusted text on the terminal: escapes are shown, not obeyed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def is_harmless(text: str) -> bool:
 def test_any_text_is_harmless_when_it_is_printed_and_plain_text_is_as_it_was(text: str) -> None:
     shown = printable(text)
     assert is_harmless(shown)
-    shown.encode()  # lone surrogates are nothing that a terminal takes
+    shown.encode()  # a terminal accepts no lone surrogates
     if is_harmless(text):
         assert shown == text
 

@@ -1,4 +1,4 @@
-"""The client where something is wrong: the answer is not the service's, the target is no place for a file."""
+"""The client's errors: answers that are not the service's, and targets that are no place for a file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KNOWN = {"id": "0" * 32}
 
 @contextmanager
 def answering(status: int, body: bytes, kind: str = "text/html") -> Iterator[tuple[str, list[bytes]]]:
-    """Serve one answer to everything; yield the address, and what was sent there: requests and bodies."""
+    """Serve one answer to every request; yield the address, and the received requests and bodies."""
     got: list[bytes] = []
 
     class Handler(BaseHTTPRequestHandler):
@@ -36,7 +36,7 @@ def answering(status: int, body: bytes, kind: str = "text/html") -> Iterator[tup
         do_POST = do_GET
 
         def log_message(self, *_: object) -> None:
-            """Be silent."""
+            """Log nothing."""
 
     with HTTPServer(("127.0.0.1", 0), Handler) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})

@@ -1,4 +1,4 @@
-"""Connections of strangers are limited: in number, in the size of a head, in the time for head, body and answer."""
+"""Unauthenticated connections are limited: in number, in the size of a head, in the time for head, body and answer."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ SILENT = b""
 HALF = b"GET / HTTP/1.1\r\nHost: a\r\nX: "
 ASKED = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
 OWN = ASKED.replace(b"/ ", b"/own ")
-"""As one who has the token asks."""
+"""A request of a client with the token."""
 LARGE = ASKED.replace(b"/ ", b"/large ")
 BODY = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 400000\r\n\r\n"
 CHUNKED = BODY.replace(b"Content-Length: 400000", b"Transfer-Encoding: chunked")
 REFUSED = BODY.replace(b"/ ", b"/refused ")
 HELD = ASKED.replace(b"/ ", b"/held ")
 LENGTH = 16_000_000
-"""Of the large answer, byte: more than the buffers of a connection hold."""
+"""Size of the large answer, byte: more than the buffers of a connection hold."""
 
 
 async def answering(scope: Any, receive: Any, send: Any) -> None:
-    """Answer a request once it is whole; `/refused` at once, `/held` never, `/large` with more than a socket holds."""
+    """Answer a whole request: `/refused` at once, `/held` never, `/large` with more than a socket holds."""
     if scope["path"] == "/own":
         scope["extensions"][KNOWN]["tell"]()
     while scope["path"] != "/refused":
@@ -57,7 +57,7 @@ async def answering(scope: Any, receive: Any, send: Any) -> None:
 
 
 class Listening(uvicorn.Server):
-    """A server with limits in a thread of this process, whose time passes as the test says."""
+    """A limited server in a thread of this process; the test controls its time."""
 
     def __init__(self) -> None:
         self.connections = Connections(MOST, MOST_WITH_YOUNG)
@@ -76,7 +76,7 @@ class Listening(uvicorn.Server):
         await super().startup(sockets)
 
     def open(self, sent: bytes) -> socket.socket:
-        """Connect, send something, and wait until the server has it."""
+        """Connect, send bytes, and wait until the server has them."""
         connection = socket.create_connection(self.socket.getsockname(), 20.0)
         self.opened.append(connection)
         connection.sendall(sent)
@@ -84,18 +84,18 @@ class Listening(uvicorn.Server):
         return connection
 
     def turns(self) -> None:
-        """Let the server do what there is to do."""
+        """Let the server do its pending work."""
         for _ in range(6):  # accept, begin, read, answer
             self.call(lambda: None)
 
     def call(self, what: Callable[[], object]) -> None:
-        """Call something in the thread of the server."""
+        """Call a function in the thread of the server."""
         done: Future[None] = Future()
         self.loop.call_soon_threadsafe(lambda: done.set_result(what() and None))
         done.result(20.0)
 
     def pass_time(self, seconds: float) -> None:
-        """Let time pass in steps of a second."""
+        """Advance the server's time in steps of a second."""
         while seconds > 0.0:
             self.call(lambda: self.connections.spend(1.0))
             seconds -= 1.0
@@ -117,7 +117,7 @@ def listening(monkeypatch: pytest.MonkeyPatch) -> Iterator[Listening]:
 
 
 def end_of(connection: socket.socket) -> bytes:
-    """Return all that is answered until the connection ends."""
+    """Return all bytes of the answer until the connection ends."""
     answer = bytearray()
     try:
         while block := connection.recv(65536):
@@ -230,7 +230,7 @@ def test_connections_that_come_together_are_read_before_one_of_them_is_closed(
 def test_who_has_the_token_keeps_the_connection_while_strangers_come(listening: Listening) -> None:
     own = listening.open(OWN)
     assert own.recv(4096).endswith(bytes(2))
-    own.sendall(BODY)  # and is slow with what follows
+    own.sendall(BODY)  # the rest of the request is slow
     for _ in range(3 * MOST):
         listening.open(SILENT)
     own.sendall(bytes(400_000))

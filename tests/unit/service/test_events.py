@@ -1,4 +1,4 @@
-"""A stream of events has the last one, whenever it comes."""
+"""A stream of events includes the last event, whenever it comes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from vibroimpact.service.routes import events as module
-from vibroimpact.service.store import Asked, Event, Kind, State, Store
+from vibroimpact.service.store import Event, Kind, NewJob, State, Store
 
 
 class Connected:
@@ -19,7 +19,7 @@ class Connected:
         return False
 
 
-async def states_told(store: Store, name: str) -> list[str]:
+async def state_lines(store: Store, name: str) -> list[str]:
     request: Any = Connected()
     return [lines async for lines in module._stream(store, name, 0, request)]
 
@@ -29,7 +29,7 @@ def test_an_end_that_comes_while_one_looks_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, look: int
 ) -> None:
     store = Store(tmp_path)
-    job, _ = store.submit(Asked(Kind.run, "short", "a scene"))
+    job, _ = store.submit(NewJob(Kind.run, "short", "a scene"))
     read, looks = store.events, []
 
     def ends_meanwhile(name: str, *, after: int = 0) -> list[Event]:
@@ -41,6 +41,6 @@ def test_an_end_that_comes_while_one_looks_is_told(
 
     monkeypatch.setattr(store, "events", ends_meanwhile)
     monkeypatch.setattr(module, "LOOKS", 0.01)
-    told = asyncio.run(states_told(store, job.id))
+    lines = asyncio.run(state_lines(store, job.id))
     store.close()
-    assert [line.count('"state": "done"') for line in told] == [0, 1]
+    assert [line.count('"state": "done"') for line in lines] == [0, 1]

@@ -1,4 +1,4 @@
-"""FMUs that are uploaded: their descriptions are read by a process of its own, and cost the service nothing."""
+"""Uploaded FMUs: a separate process reads their descriptions, at no cost to the service."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_description_in_order_is_taken_and_not_read_in_the_service(tmp_path: P
 
 def test_a_description_that_breaks_the_rules_is_refused_by_its_name(tmp_path: Path, store: FmuStore) -> None:
     file = sent(tmp_path, '<ScalarVariable valueReference="0"><Real/></ScalarVariable>')
-    for _ in range(2):  # it lies unpacked the second time
+    for _ in range(2):  # the second time it is already unpacked
         with pytest.raises(UsageError, match=r"^own\.fmu: modelDescription\.xml: ") as refused:
             store.add(file, "own.fmu")
     assert str(tmp_path) not in str(refused.value)
@@ -60,7 +60,7 @@ def test_a_description_that_breaks_the_rules_is_refused_by_its_name(tmp_path: Pa
 def test_a_description_that_takes_long_is_refused(
     tmp_path: Path, store: FmuStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One of 4e5 variables, in an archive of 2 MB, made the service deaf for 52 s."""
+    """A description of 4e5 variables, in an archive of 2 MB, blocked the service for 52 s."""
     monkeypatch.setattr(fmus, "DESCRIPTION_SECONDS", 0.05)
     file = sent(tmp_path, *(VARIABLE.format(k) for k in range(20_000)))
     with pytest.raises(UsageError, match=r"^own\.fmu: modelDescription\.xml: expected XML that can be read"):

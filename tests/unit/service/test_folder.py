@@ -1,4 +1,4 @@
-"""The folder of a service that others have been in: one error each, and what is not its own stays."""
+"""The folder of a service with foreign changes: one error each, and foreign files stay."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.service import ownership
 from vibroimpact.service.ownership import refuse_foreign_folder
 from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.security import token_of
-from vibroimpact.service.store import DATABASE, LAYOUT, Asked, Kind, State, Store
+from vibroimpact.service.store import DATABASE, LAYOUT, Kind, NewJob, State, Store
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_database_of_the_same_layout_without_its_tables_gets_them(tmp_path: Pa
 
 def test_an_older_database_takes_nothing_from_what_was_computed_since(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    jobs = [store.submit(Asked(Kind.run, "computed", "a scene"))[0] for _ in range(3)]
+    jobs = [store.submit(NewJob(Kind.run, "computed", "a scene"))[0] for _ in range(3)]
     folders = [store.folder_of(job.id) for job in jobs]
     (folders[0] / "log.txt").touch()
     (tmp_path / "jobs" / "notes.txt").write_text("of a person", encoding="utf-8")
@@ -102,7 +102,7 @@ def test_a_kill_while_a_job_is_deleted_leaves_nothing_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(tmp_path)
-    job, _ = store.submit(Asked(Kind.run, "deleted", "a scene"))
+    job, _ = store.submit(NewJob(Kind.run, "deleted", "a scene"))
     (store.folder_of(job.id) / "log.txt").touch()
     assert not store.delete(job.id), "it waits"
     store.change(job.id, state=State.done)

@@ -1,4 +1,4 @@
-"""A database that another program holds, or that fails for a while, delays the service and ends nothing."""
+"""A database that another program has locked, or that fails for a while, delays the service and ends nothing."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from vibroimpact.fmus.processes.process import Process
 from vibroimpact.service import store as store_module
 from vibroimpact.service import supervisor as module
 from vibroimpact.service.problems import answer_problems
-from vibroimpact.service.store import DATABASE, Asked, Job, Kind, State, Store
+from vibroimpact.service.store import DATABASE, Job, Kind, NewJob, State, Store
 from vibroimpact.service.supervisor import Supervisor
 
-ASKED = Asked(Kind.run, "held", "a scene")
+JOB = NewJob(Kind.run, "held", "a scene")
 WORKS = 'import time; time.sleep(0.3); print(\'{"total": 1, "done": 1}\')'
 
 
 @pytest.fixture
 def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
-    """Of a service whose jobs are done in an instant, and which waits for nothing long."""
+    """Yield the store of a service whose jobs finish instantly, and whose pauses are short."""
     monkeypatch.setattr(store_module, "HELD_SECONDS", 0.01)
     monkeypatch.setattr(module, "PAUSE", 0.05)
     monkeypatch.setattr(module, "IDLE", 0.02)
@@ -48,7 +48,7 @@ def supervisor(store: Store) -> Iterator[Supervisor]:
 
 
 def holder(store: Store) -> sqlite3.Connection:
-    """Return another program's connection, which holds the database until it is closed."""
+    """Return another program's connection, which locks the database until it is closed."""
     other = sqlite3.connect(store.folder / DATABASE, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     return other
@@ -64,7 +64,7 @@ def until(store: Store, job: Job, state: State) -> Job:
 
 @pytest.mark.usefixtures("supervisor")
 def test_a_job_that_waits_begins_when_the_database_is_let_go(store: Store) -> None:
-    job, _ = store.submit(ASKED)
+    job, _ = store.submit(JOB)
     other = holder(store)
     time.sleep(0.2)
     other.close()
@@ -73,7 +73,7 @@ def test_a_job_that_waits_begins_when_the_database_is_let_go(store: Store) -> No
 
 @pytest.mark.usefixtures("supervisor")
 def test_the_end_of_a_job_is_noted_when_the_database_is_let_go(store: Store) -> None:
-    job, _ = store.submit(ASKED)
+    job, _ = store.submit(JOB)
     until(store, job, State.running)
     other = holder(store)
     time.sleep(0.6)
@@ -85,7 +85,7 @@ def test_the_end_of_a_job_is_noted_when_the_database_is_let_go(store: Store) -> 
 def test_a_job_is_taken_up_again_after_a_database_that_failed(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    job, _ = store.submit(ASKED)
+    job, _ = store.submit(JOB)
     until(store, job, State.running)
     failed = threading.Event()
     with monkeypatch.context() as patched:
@@ -95,7 +95,7 @@ def test_a_job_is_taken_up_again_after_a_database_that_failed(
             raise sqlite3.OperationalError("disk I/O error")
 
         patched.setattr(store, "change", fails)
-        assert failed.wait(20.0)  # as the end of the job is noted, or what it said before
+        assert failed.wait(20.0)  # the database fails for the end of the job, or for its last message
     assert until(store, job, State.done).attempts == 2
 
 
@@ -114,7 +114,7 @@ def test_a_short_machine_delays_jobs_and_is_said_once(
     monkeypatch.setattr(module, "LONGEST_PAUSE", 0.05)
     with monkeypatch.context() as patched, caplog.at_level("WARNING"):
         patched.setattr(module, place, refuse)
-        jobs = [store.submit(ASKED)[0] for _ in range(3)]
+        jobs = [store.submit(JOB)[0] for _ in range(3)]
         for _ in range(6):
             assert refusals.acquire(timeout=20.0)
         assert {store.job(job.id).state for job in jobs} <= {State.queued, State.running}
@@ -130,17 +130,17 @@ def test_who_asks_meanwhile_is_told_to_ask_again(store: Store) -> None:
 
     @app.post("/")
     def submit() -> dict[str, Any]:
-        return {"id": store.submit(ASKED)[0].id}
+        return {"id": store.submit(JOB)[0].id}
 
-    async def asked() -> httpx.Response:
+    async def answer() -> httpx.Response:
         transport = httpx.ASGITransport(app)
         async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
             return await client.post("/")
 
     other = holder(store)
-    refused = asyncio.run(asked())
+    refused = asyncio.run(answer())
     other.close()
     assert (refused.status_code, refused.headers["Retry-After"]) == (503, "2")
     assert "another program holds" in refused.json()["detail"]
     assert not list((store.folder / "jobs").glob("*"))
-    assert asyncio.run(asked()).status_code == 200
+    assert asyncio.run(answer()).status_code == 200

@@ -25,13 +25,13 @@ OPERATIONS = (
 )
 
 
-@pytest.mark.parametrize(("asked", "names"), OPERATIONS, ids=lambda value: type(value).__name__)
+@pytest.mark.parametrize(("operation", "names"), OPERATIONS, ids=lambda value: type(value).__name__)
 def test_what_to_install_is_said_before_anything_of_the_service_is_imported(
-    asked: ServiceOperation, names: str, monkeypatch: pytest.MonkeyPatch
+    operation: ServiceOperation, names: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(packages, "find_spec", lambda name: None)
-    place = f"vibroimpact.{asked.runs.partition(':')[0]}"
+    place = f"vibroimpact.{operation.runs.partition(':')[0]}"
     monkeypatch.delitem(sys.modules, place, raising=False)
     with pytest.raises(UsageError, match=rf"got none of {names}\. .*pip install 'vibroimpact\[service\]'"):
-        asked.carry_out()
+        operation.carry_out()
     assert place not in sys.modules

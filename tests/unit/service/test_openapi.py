@@ -1,4 +1,4 @@
-"""What clients of the service may ask, and what they are answered, is what it was: `openapi.json` has it."""
+"""The service's requests and answers are unchanged: `openapi.json` describes them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies of requests are made from declared operations: their keys, limits and words."""
+"""Bodies of requests are made from declared operations: their keys, limits and descriptions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ESTIMATE: TypeAdapter[BaseModel] = TypeAdapter(requests.Estimate)
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "body",
     [
         {"kind": "decay", "unknown": 1},
         {"kind": "nonsense"},
@@ -31,9 +31,9 @@ ESTIMATE: TypeAdapter[BaseModel] = TypeAdapter(requests.Estimate)
         {"kind": "decay", "output": "/etc/passwd"},
     ],
 )
-def test_a_body_that_breaks_the_declaration_is_refused(asked: dict[str, Any]) -> None:
+def test_a_body_that_breaks_the_declaration_is_refused(body: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
-        ESTIMATE.validate_python(asked)
+        ESTIMATE.validate_python(body)
 
 
 def test_keys_have_the_words_of_the_arguments() -> None:
@@ -48,8 +48,8 @@ def test_a_job_carries_out_the_operation_that_was_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[EstimateImpacts] = []
-    monkeypatch.setattr(EstimateImpacts, "carry_out", lambda asked, spelling: done.append(asked))
-    asked = {"kind": "impacts", "stop": 2.0, "stop_position": 0.5, "mass": 3.0}
-    requests.estimate(tmp_path, {"data": "a.nc", "asked": asked})
+    monkeypatch.setattr(EstimateImpacts, "carry_out", lambda body, spelling: done.append(body))
+    body = {"kind": "impacts", "stop": 2.0, "stop_position": 0.5, "mass": 3.0}
+    requests.estimate(tmp_path, {"data": "a.nc", "asked": body})
     place = {"data": tmp_path / "a.nc", "output": tmp_path / requests.OUTPUT, "force": True}
     assert done == [EstimateImpacts(**place, stop_time=2.0, stop=0.5, mass=3.0)]

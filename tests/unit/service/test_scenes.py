@@ -1,4 +1,4 @@
-"""Where the problems of a submitted scene are."""
+"""Lines and columns of the problems of a submitted scene."""
 
 from __future__ import annotations
 

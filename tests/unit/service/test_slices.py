@@ -122,10 +122,10 @@ def test_a_map_can_be_of_what_plot_draws_maps_of(file: Path) -> None:
             assert np.isfinite(found).any()
             np.testing.assert_array_equal(found, runs)
         names = [one.name for one in classify(dataset)]
-    told = answers["class"]
-    assert [told["classes"][int(place)] for place in told["value"]] == names
+    answer = answers["class"]
+    assert [answer["classes"][int(place)] for place in answer["value"]] == names
     assert {"P(1,1)"} < set(names), "motions of several classes"
-    counts = [names.count(name) for name in told["classes"]]
+    counts = [names.count(name) for name in answer["classes"]]
     assert counts == sorted(counts, reverse=True)
     assert answers["largest_impact_velocity"]["classes"] == []
 
@@ -160,7 +160,7 @@ def test_keys_that_move_together_are_one_axis_of_a_map(tmp_path: Path) -> None:
     ]
     found = slice_of(landed, Selection({}, {}), 20)
     assert (found["rows"], found["every"], found["shown"]) == (60, 2, 20)
-    # held at one of them there is one axis left, whose points are all drawn
+    # with one of them held, a single axis is left, and all of its points are drawn
     assert slice_of(landed, Selection({"mass": 1.1}, {}), 30)["shown"] == 20
 
 
@@ -210,7 +210,7 @@ def test_a_stop_limits_the_point_that_it_is_at(
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     found = simulated(tmp_path / "scene.toml", tmp_path / "dataset.nc", 0)["stops"]
     assert found[name] == stops[name]
-    # the tip of the beam is observed, at which no stop is; of the chain the mass at its first stop
+    # the observed tip of a beam has no stop; the observed mass of a chain is the mass at its first stop
     assert ("displacement" in found) == ("chain" in body)
 
 
@@ -232,7 +232,7 @@ def test_a_point_of_a_path_is_simulated_from_where_the_one_before_ended(file: Pa
         for run in (0, 7, 33, 79):
             found = simulated(file.parent / "scene.toml", file.parent, run)
             json.dumps(found, allow_nan=False)
-            # samples cut the flights between impacts, which changes their rounding
+            # samples cut the flights between impacts, which changes their rounding errors
             assert found["periods"]["strobe_displacement"] == pytest.approx(
                 runs.strobe_displacement.values[run].tolist(), rel=1e-9
             )

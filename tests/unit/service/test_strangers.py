@@ -1,4 +1,4 @@
-"""Requests of strangers: refused by their heads, under names of this service alone, in few lines of the log."""
+"""Unauthenticated requests: refused by their heads, under names of this service alone, in few lines of the log."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def inside() -> str:
     return "inside"
 
 
-def asked(path: str = "/inside", names: tuple[str, ...] = (), **headers: str) -> httpx.Response:
+def answer_to(path: str = "/inside", names: tuple[str, ...] = (), **headers: str) -> httpx.Response:
     guarded = Guarded(app, "secret", Sessions("secret"), Hosts("127.0.0.1", names))
 
     async def ask() -> httpx.Response:
@@ -54,7 +54,7 @@ def asked(path: str = "/inside", names: tuple[str, ...] = (), **headers: str) ->
 def test_the_scheme_of_the_token_is_taken_in_any_case_and_the_token_in_its_own(
     given: str, status: int
 ) -> None:
-    assert asked(Authorization=given).status_code == status
+    assert answer_to(Authorization=given).status_code == status
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_the_scheme_of_the_token_is_taken_in_any_case_and_the_token_in_its_own(
     ["127.0.0.1", "127.0.0.1:9999", "localhost:8737", "LOCALHOST", "[::1]:8737", "127.8.0.1", "Lab.Example."],
 )
 def test_the_service_is_asked_by_its_addresses_and_the_names_of_its_owner(host: str) -> None:
-    assert asked(names=("lab.example",), Host=host).status_code == 200
+    assert answer_to(names=("lab.example",), Host=host).status_code == 200
 
 
 @pytest.mark.parametrize("path", ["/inside", "/healthz"])
@@ -82,7 +82,7 @@ def test_the_service_is_asked_by_its_addresses_and_the_names_of_its_owner(host: 
     ],
 )
 def test_a_page_of_another_name_that_leads_here_is_not_answered(path: str, host: str) -> None:
-    refused = asked(path, Host=host)
+    refused = answer_to(path, Host=host)
     assert refused.status_code == 421
     assert refused.headers["content-type"] == "application/problem+json"
     assert "--allow-host" in refused.json()["detail"]
@@ -105,8 +105,8 @@ def test_what_is_no_name_of_a_host_is_refused(name: str) -> None:
 
 
 def lines_of(*records: tuple[str, dict[str, Any], float]) -> list[dict[str, Any]]:
-    """Return the lines that become of messages, with their facts, at times."""
-    written, seldom, form = [], module._Seldom(), module._Lines()
+    """Return the log lines of messages with their facts, at given times."""
+    written, seldom, form = [], module._RepeatFilter(), module._Lines()
     for message, facts, at in records:
         name = "vibroimpact.service" if facts else "uvicorn.error"
         record = logging.makeLogRecord(

@@ -1,4 +1,4 @@
-"""Requests without the token take turns, and none of them takes a thread: others do not wait behind them."""
+"""Requests without the token take turns, and none of them holds a thread: others do not wait behind them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from vibroimpact.service.page_files import serve_page
 from vibroimpact.service.security import HEALTH, Guarded
 from vibroimpact.service.serving import _Server
 from vibroimpact.service.sessions import Sessions
-from vibroimpact.service.turns import REST, Turns
+from vibroimpact.service.turns import PAUSE_RATIO, Turns
 
 STRANGERS = 6
 TURN_SECONDS = 0.01
 WAITING = 300
-"""Connections to a service that is busy: more than it takes in one pass."""
+"""Number of connections to a busy service: more than it accepts in one pass."""
 
 
 def test_strangers_take_turns_in_their_order_and_leave_half_of_the_time_to_others() -> None:
@@ -42,7 +42,7 @@ def test_strangers_take_turns_in_their_order_and_leave_half_of_the_time_to_other
 
     taken = asyncio.run(all_of_them())
     assert order == list(range(STRANGERS))
-    assert taken > (STRANGERS + (STRANGERS - 1) * REST) * TURN_SECONDS
+    assert taken > (STRANGERS + (STRANGERS - 1) * PAUSE_RATIO) * TURN_SECONDS
 
 
 def test_a_connection_that_is_closed_gives_its_turn_to_the_next() -> None:
@@ -71,7 +71,7 @@ def test_a_task_that_is_cancelled_holds_no_turn() -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "token", "asked", "turn", "is_answered"),
+    ("path", "token", "expected", "turn", "is_answered"),
     [
         ("/inside", "secret", [], False, True),
         ("/inside", "wrong", [False], True, True),
@@ -81,7 +81,7 @@ def test_a_task_that_is_cancelled_holds_no_turn() -> None:
     ids=["with the token", "a stranger", "a stranger who left", "health"],
 )
 def test_only_requests_without_the_token_wait_for_a_turn(
-    path: str, token: str, asked: list[bool], turn: bool, is_answered: bool
+    path: str, token: str, expected: list[bool], turn: bool, is_answered: bool
 ) -> None:
     waited: list[bool] = []
     sent: list[Any] = []
@@ -110,7 +110,7 @@ def test_only_requests_without_the_token_wait_for_a_turn(
     }
     guarded = Guarded(inside, "secret", Sessions("secret"), Hosts("127.0.0.1"))
     asyncio.run(guarded(scope, receive, send))
-    assert waited == asked
+    assert waited == expected
     assert bool(sent) is is_answered
 
 
@@ -136,7 +136,7 @@ def test_a_busy_service_drops_no_connection_that_waits_to_be_taken() -> None:
         busy = threading.Event()
         server.servers[0].get_loop().call_soon_threadsafe(busy.wait)
         try:
-            # one that is dropped tries again after 1 s
+            # a dropped connection is retried after 1 s
             waiting = [socket.create_connection(listening.getsockname(), 0.5) for _ in range(WAITING)]
         finally:
             busy.set()

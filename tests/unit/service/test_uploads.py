@@ -1,4 +1,4 @@
-"""What a killed service has received is removed when the next one begins; nothing else in its folder is."""
+"""Uploads that a killed service has left behind are removed at the next start; other files in the folder stay."""
 
 from __future__ import annotations
 

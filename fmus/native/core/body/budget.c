@@ -3,11 +3,11 @@
 #include <float.h>
 #include <math.h>
 
-/* Evaluations after which a step ends early: some hundredths of a second. */
+/* Evaluations after which a step ends early: some hundredths of a second of computation. */
 static const int64_t STEP_EVALUATIONS = (int64_t)1 << 20;
-/* The same for importers that do not let steps end early: a minute or so, then the step is not finished. */
+/* Evaluations after which a step is given up when the importer does not let steps end early: about a minute. */
 static const int64_t MOST_STEP_EVALUATIONS = (int64_t)1 << 30;
-/* Evaluations within which time must advance by more than its rounding: several seconds. */
+/* Evaluations within which time must advance by more than its rounding, or the step is given up: several seconds. */
 static const int64_t PATIENCE = (int64_t)1 << 26;
 
 void vi_budget_start(vi_budget *budget, vi_instant now)
@@ -15,7 +15,7 @@ void vi_budget_start(vi_budget *budget, vi_instant now)
     *budget = (vi_budget){.mark = now};
 }
 
-/* Has time advanced by no more than the rounding of its number since the mark? Moves the mark. */
+/* Has time advanced since the mark by no more than the rounding of its number? Moves the mark. */
 static bool crawls(vi_budget *budget, const vi_clock *clock, vi_instant now)
 {
     const double advanced = vi_clock_elapsed(clock, budget->mark, now);

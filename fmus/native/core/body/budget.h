@@ -1,7 +1,7 @@
-/* How much a step may compute before its importer is heard again, and whether time comes forward at all.
+/* Limits on the computation of a step, and the check that time advances at all.
  *
- * Counted in evaluations of one mode, not in seconds, so that the same step ends at the same place on every machine. A
- * step that has spent its budget ends early; the next one is its rest and goes on as if there had been no end.
+ * Work is counted in evaluations of one mode, not in seconds, so that a step ends at the same place on every machine. A
+ * step that has spent its budget ends early. The next step continues it as if it had not ended.
  */
 #ifndef VIBROIMPACT_BUDGET_H
 #define VIBROIMPACT_BUDGET_H
@@ -17,8 +17,8 @@ typedef struct {
     int64_t spent;      /* evaluations in this step */
     int64_t since_mark; /* evaluations since `mark` */
     vi_instant mark;
-    int64_t events;     /* of contacts since the start: impacts, grazes, touch-downs, rests */
-    int64_t unfinished; /* the last step ended for no reason of the motion: the next one is its rest */
+    int64_t events;     /* of contacts since the start: impacts, grazes, touch-downs, sticks */
+    int64_t unfinished; /* the last step ended for want of budget or room; the next step continues it */
 } vi_budget;
 
 static inline void vi_budget_spend(vi_budget *budget, int64_t evaluations)
@@ -28,11 +28,11 @@ static inline void vi_budget_spend(vi_budget *budget, int64_t evaluations)
 
 void vi_budget_start(vi_budget *budget, vi_instant now);
 
-/* VI_STEP_DONE when a step may go on at `now`; else how it ends. event_limit: 0: none. */
+/* VI_STEP_DONE when a step may go on at `now`; otherwise the result with which it ends. event_limit 0: no limit. */
 vi_step_result vi_budget_look(vi_budget *budget, const vi_clock *clock, vi_instant now, int64_t event_limit,
                               const vi_step_request *request);
 
-/* A step ends with this result, which is returned. */
+/* End a step with this result, which is returned. */
 vi_step_result vi_budget_end(vi_budget *budget, vi_step_result result);
 
 /* Say why a step was given up at `time`, s: VI_STEP_CRAWL or VI_STEP_NOT_FINITE. */

@@ -4,15 +4,15 @@
 
 #include "body/landing.h"
 
-/* Speed after an impact, relative to the largest approach of the sequence, below which the rest of the chatter is
- * summed: its impacts are seen one by one before. */
+/* Speed after an impact, relative to the fastest approach of the sequence. Below it the remaining chatter is summed;
+ * above it impacts are resolved one by one. */
 static const double TAIL_VELOCITY = 1e-4;
-/* Largest error of the summed time, in units of 1 / fastest rate. */
+/* Largest error of the summed time, in units of 1 / fastest rate; a larger estimate keeps the impacts resolved. */
 static const double TAIL_ERROR = 1e-16;
-/* Height of a bounce, in resolutions of displacements, below which it cannot be followed: the body rests. */
+/* Height of a bounce, in resolutions of displacements, below which it cannot be followed: the body sticks. */
 static const double LOWEST_BOUNCE = 8.0;
-/* Low impacts in a row after which the body rests: only restitution (almost) 1 gets there, whose chatter has no end (or
- * none in reach). */
+/* Low impacts in a row after which the body sticks. Only a restitution (almost) 1 reaches this number: its chatter has
+ * no end, or none within reach. */
 static const int64_t MOST_LOW_IMPACTS = 4000000;
 
 bool vi_chatter_is_low(double pressure, double speed, double fastest)
@@ -47,7 +47,7 @@ static tail sum_tail(const vi_bounces *b)
     const double relative = (fabs(b->slope) / b->pressure + b->drag) * t;
     const double bend = fabs(b->bend) * t * t / b->pressure, dragged = b->drag * t / 3.0;
     tail sum;
-    /* 3.1 to second order in t; for r near 1, where t is long, drag g turns it into ln(1 + g t/3)/(g/3) */
+    /* 3.1 to second order in t; for r near 1, where t is long, drag g turns t into ln(1 + g t/3)/(g/3) */
     sum.duration = (dragged > 0.0 ? t * (log1p(dragged) / dragged) : t) - t * t / 3.0 * (b->slope / b->pressure);
     sum.error = t * (relative * relative + bend);
     sum.complete = relative + bend < 0.25 && t * b->moving < 0.5;

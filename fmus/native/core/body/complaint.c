@@ -8,7 +8,7 @@
 #include "motion/clock.h"
 #include "sizes.h"
 
-/* Longest name of a variable with its index. */
+/* Longest name of a variable with its index, in bytes. */
 enum { NAME_LENGTH = 64 };
 
 static void mark_as_cut(char message[VI_MESSAGE_LENGTH])

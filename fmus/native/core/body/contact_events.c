@@ -25,6 +25,6 @@ void vi_contact_stick(vi_contact *contact, const vi_clock *clock, vi_instant now
 void vi_contact_lift(vi_contact *contact, const vi_clock *clock, vi_instant now)
 {
     contact->stick_end = vi_clock_time(clock, now);
-    contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* lifted before the chatter had ended */
+    contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* it lifted during its chatter */
     contact->stuck = 0;
 }

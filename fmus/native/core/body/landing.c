@@ -1,8 +1,8 @@
 #include "body/landing.h"
 
-/* Largest distance of a step's end and a contact that are one instant, s, in units of 1 + |time|. */
+/* Time between a step's end and a contact, s, in units of 1 + |time|; at most this, both are one instant. */
 static const double LANDING = 1e-13;
-/* Length of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
+/* Longest segment, in periods; more than one, so that a flight of one period is not cut in two. */
 static const double LONGEST_SEGMENT = 1.5;
 
 double vi_segment_length(const vi_clock *clock, vi_instant now, vi_instant target, bool periods, vi_ending *ending)

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Add the next of the laws to a list of them; what finds no room is left out. */
+/* Append a law to a list of laws; text beyond the room is cut. */
 static void list(char *text, size_t size, int64_t law, const char *joint)
 {
     const size_t used = strlen(text);

@@ -10,7 +10,7 @@ void vi_record_take(vi_record *record)
         memmove(record->rows, record->rows + (record->count - left) * VI_RECORD_WIDTH,
                 (size_t)left * VI_RECORD_WIDTH * sizeof(double));
         record->count = left;
-        record->told = 0;
+        record->reported = 0;
     }
     record->taken = 0;
 }
@@ -41,8 +41,8 @@ bool vi_record_full(const vi_record *record)
 
 bool vi_record_ends_step(vi_record *record)
 {
-    const bool ends = vi_record_full(record) && !record->told;
-    record->told |= ends;
+    const bool ends = vi_record_full(record) && !record->reported;
+    record->reported |= ends;
     return ends;
 }
 

@@ -4,10 +4,10 @@
 #include <math.h>
 #include <string.h>
 
-/* Pivots smaller than this times the largest diagonal mean that contacts are redundant. */
+/* Pivot, relative to the largest diagonal, below which contacts count as redundant. */
 static const double REDUNDANT = 1e-13;
-/* Redundant contacts share their load as if each had this times the largest mobility of its own; what that leaves over
- * is solved for again, so many times. */
+/* Compliance added to each redundant contact, relative to the largest mobility: redundant contacts then share their
+ * load. REFINEMENTS is the number of solutions; each solves for the residual of the last. */
 static const double SOFTENING = 1e-6;
 enum { REFINEMENTS = 4 };
 
@@ -37,7 +37,7 @@ static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
     return 1;
 }
 
-/* Solve for the contacts in `index`, softened or not, with right-hand side b; 0 when they are redundant. */
+/* Solve for the contacts in `index`, with this softening and right-hand side b; 0 when the contacts are redundant. */
 static int solve(int count, double g[VI_PORTS][VI_PORTS], const int index[], const double b[], double softening,
                  double smallest, double p[])
 {
@@ -57,7 +57,7 @@ static int solve(int count, double g[VI_PORTS][VI_PORTS], const int index[], con
     return 1;
 }
 
-/* Redundant contacts: softened, and what that leaves over solved for again. */
+/* Solve for redundant contacts: softened, then repeatedly for the residual that the softening leaves. */
 static void share(int count, double g[VI_PORTS][VI_PORTS], const int index[], const double b[], double largest,
                   double p[])
 {
@@ -85,11 +85,11 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
                      double p[VI_PORTS])
 {
     int index[VI_PORTS], count = 0;
-    double largest = 0.0, wanted[VI_PORTS], found[VI_PORTS];
+    double largest = 0.0, load[VI_PORTS], found[VI_PORTS];
     for (int k = 0; k < n; ++k) {
         p[k] = 0.0;
         if (active[k]) {
-            wanted[count] = b[k];
+            load[count] = b[k];
             index[count++] = k;
             largest = fmax(largest, fabs(g[k][k]));
         }
@@ -97,17 +97,16 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
     if (count == 0 || !(largest > 0.0)) {
         return;
     }
-    if (!solve(count, g, index, wanted, 0.0, REDUNDANT * largest, found)) {
-        share(count, g, index, wanted, largest, found);
+    if (!solve(count, g, index, load, 0.0, REDUNDANT * largest, found)) {
+        share(count, g, index, load, largest, found);
     }
     for (int i = 0; i < count; ++i) {
         p[index[i]] = found[i];
     }
 }
 
-/* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. Finite for positive
- * definite g; the bound on the turns is that of its proof. 0 when it was not: redundant
- * contacts may send it in circles. */
+/* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. It is finite for
+ * positive definite g, with the proof's bound on the turns. Returns 0 at the bound: redundant contacts may cycle. */
 static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], int active[VI_PORTS],
                            double p[VI_PORTS])
 {
@@ -140,7 +139,7 @@ void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_POR
 {
     int active[VI_PORTS];
     if (!pivot_to_answer(n, g, b, active, p)) {
-        /* all softened, so that every set of contacts has one answer; what that leaves over is solved for again */
+        /* soften all contacts, so that every set of contacts has one answer; then solve again for the residual */
         double soft[VI_PORTS][VI_PORTS], found[VI_PORTS], largest = 0.0, least = 0.0;
         for (int k = 0; k < n; ++k) {
             largest = fmax(largest, fabs(g[k][k]));

@@ -4,9 +4,8 @@
 
 #include "sizes.h"
 
-/* Find p >= 0 with g p - b >= 0 and p (g p - b) = 0 for the first n contacts. The order in which contacts are listed does
- * not matter: for a positive definite g there is one answer; where contacts are redundant (the same point twice) the
- * answer shares the load evenly. */
+/* Find p >= 0 with g p - b >= 0 and p (g p - b) = 0 for the first n contacts. The order of the contacts does not
+ * matter. A positive definite g has one answer; redundant contacts (the same point twice) share the load evenly. */
 void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double p[VI_PORTS]);
 
 /* Solve g p = b for the contacts that are active; the other p are 0. */

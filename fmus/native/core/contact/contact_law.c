@@ -24,7 +24,7 @@ static vi_contact_force linear_force(const vi_press *press, double penetration, 
     return (vi_contact_force){press->stiffness * penetration + press->damping * rate, press->stiffness, press->damping};
 }
 
-/* The force of any power law. */
+/* The force of a power law with any exponent. */
 static vi_contact_force power_force(const vi_press *press, double penetration, double rate)
 {
     const double spring = press->stiffness * pow(penetration, press->exponent);
@@ -32,7 +32,7 @@ static vi_contact_force power_force(const vi_press *press, double penetration, d
     return (vi_contact_force){spring * drag, press->exponent * spring / penetration * drag, spring * press->damping};
 }
 
-/* The same of exponent 1.5 without damping: a root is several times faster than a power. */
+/* The force of exponent 1.5 without damping: a square root is several times faster than a power. */
 static vi_contact_force root_force(const vi_press *press, double penetration, double rate)
 {
     const double root = sqrt(penetration);
@@ -42,8 +42,8 @@ static vi_contact_force root_force(const vi_press *press, double penetration, do
 
 /* ---- the table ---- */
 
-/* Names, descriptions, kinds and numbers of the FMUs' enumeration ContactLaw are read from here when these are built: a row
- * begins with its number, its name and its description. Numbers stay: files have them. */
+/* The FMUs' enumeration ContactLaw takes names, descriptions, kinds and numbers from this table when FMUs are built. A
+ * row begins with its number, its name and its description. Files hold these numbers: never change one. */
 const vi_law vi_laws[VI_MOST_LAWS] = {
     [0] = {.name = "none", .description = "no stop here"},
     [1] = {.name = "restitution",
@@ -86,7 +86,7 @@ const vi_law vi_laws[VI_MOST_LAWS] = {
            .external = true},
 };
 
-/* ---- what is asked of it ---- */
+/* ---- queries ---- */
 
 bool vi_contact_law_exists(int64_t law)
 {

@@ -1,5 +1,5 @@
-/* How a stop that yields presses: the form of its force, from which the series of the motion, the sign of the force and the
- * rounding of that sign follow. A law that has one of these forms needs no more than its numbers. equations.md 6.9, 6.10 */
+/* The form of the force of a stop that yields. The series of the motion, the sign of the force and the rounding of this
+ * sign follow from the form. A new law of one of these forms needs only its numbers. equations.md 6.9, 6.10 */
 #ifndef VIBROIMPACT_PRESS_H
 #define VIBROIMPACT_PRESS_H
 
@@ -12,20 +12,20 @@ typedef enum {
     VI_PRESS_POWER = 3   /* stiffness d^exponent (1 + damping d'), d > 0 */
 } vi_press_kind;
 
-/* How a contact presses; d = sign (displacement - position) is its penetration. */
+/* The form and the numbers of a contact's force; d = sign (displacement - position) is the penetration. */
 typedef struct {
-    int64_t kind; /* vi_press_kind; 64 bits: no padding */
+    int64_t kind; /* vi_press_kind; 64 bits, to avoid padding */
     double constant, stiffness, damping, exponent;
 } vi_press;
 
-/* What has the sign of the force, where a constant is none: the force itself or, of a power law, 1 + damping d'. */
+/* A number with the sign of the force, if `constant` is 0: the force itself or, for a power law, 1 + damping d'. */
 static inline double vi_press_sense(const vi_press *press, double depth, double rate)
 {
     return press->damping * rate + (press->kind == VI_PRESS_POWER ? 1.0 : press->stiffness * depth);
 }
 
-/* The same sign as a distance, m: the depth that the force is as large at in rest; of a power law what is left of
- * 1 + damping d', times a typical depth. */
+/* A distance with the same sign, m. For a linear law it is the depth at which the force at rest is as large. For a
+ * power law it is 1 + damping d' times a typical depth. */
 static inline double vi_press_sense_depth(const vi_press *press, double depth, double rate, double typical)
 {
     return press->kind == VI_PRESS_POWER ? typical * (1.0 + press->damping * rate)

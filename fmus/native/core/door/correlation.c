@@ -3,17 +3,17 @@
 #include <math.h>
 #include <string.h>
 
-/* A double has 52 bits after the point; 3 of them tell 8 radii per octave apart. */
+/* A double has 52 bits after the point; the first 3 of them distinguish 8 radii per octave. */
 #define DROPPED_BITS (52 - 3)
 #define LENGTH (VI_CORRELATION_BLOCK + VI_MOST_EMBEDDING)
 
-/* The working space of one block, small enough for the innermost cache. */
+/* Workspace of one block, small enough for the innermost cache. */
 typedef struct {
     double distance[LENGTH];
     uint64_t bits[LENGTH];
     uint8_t near[LENGTH];        /* class of |x_i - x_{i+lag}| */
     uint8_t odd[LENGTH];         /* class of the distance in m = 1, 3, 5, ... dimensions */
-    uint8_t even[LENGTH];        /* the same in m + 1 */
+    uint8_t even[LENGTH];        /* class of the distance in m + 1 dimensions */
     uint16_t cell[VI_CORRELATION_BLOCK];
 } block_space;
 
@@ -30,7 +30,7 @@ static void classify(block_space *s, const double *restrict from, const double *
 {
     for (int j = 0; j < LENGTH; ++j) {
         double d = fabs(to[j] - from[j]);
-        /* in this order a NaN becomes the highest radius */
+        /* this order turns NaN into the highest radius */
         d = d < highest ? d : highest;
         s->distance[j] = d > below ? d : below;
     }
@@ -49,7 +49,7 @@ static void widen(uint8_t *restrict larger, const uint8_t *restrict running, con
     }
 }
 
-/* Neighbouring pairs often fall into one cell; tables in turn, so that no increment waits for the one before. */
+/* Count pairs by cell. Neighbouring pairs often fall into one cell: tables in turn let no increment wait. */
 static void count_cells(block_space *s, unsigned stride, size_t table, uint64_t joint[])
 {
     for (int j = 0; j < VI_CORRELATION_BLOCK; ++j) {

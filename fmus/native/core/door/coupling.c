@@ -6,9 +6,9 @@
 #include "door/seconds.h"
 
 enum { STATUS_WARNING = 1 };
-/* What a piece of a step comes to, beside VI_COUPLING_*. */
+/* Results of a part of a step, besides VI_COUPLING_*. */
 enum { GO_ON = -1, OVERTAKEN = -2 };
-/* Repetitions of one step; each is to an earlier event. */
+/* Most repetitions of one step, each up to an earlier event. */
 enum { MOST_REPETITIONS = 1000 };
 
 static bool went_well(int status)
@@ -64,25 +64,25 @@ static int make_all(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_c
 
 static int save_all(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int came_to = GO_ON;
-    for (int32_t i = 0; i < plan->count && came_to == GO_ON; ++i) {
-        came_to = make_all(plan, r, &plan->components[i].save);
+    int result = GO_ON;
+    for (int32_t i = 0; i < plan->count && result == GO_ON; ++i) {
+        result = make_all(plan, r, &plan->components[i].save);
     }
-    return came_to;
+    return result;
 }
 
 static int restore_all(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int came_to = GO_ON;
-    for (int32_t i = 0; i < plan->count && came_to == GO_ON; ++i) {
-        came_to = make_all(plan, r, &plan->components[i].restore);
+    int result = GO_ON;
+    for (int32_t i = 0; i < plan->count && result == GO_ON; ++i) {
+        result = make_all(plan, r, &plan->components[i].restore);
     }
-    return came_to;
+    return result;
 }
 
 /* ---- the step of one component ---- */
 
-/* An FMU may have changed how its process rounds, or what becomes of subnormal numbers. */
+/* Does the process round to nearest, with subnormal numbers? An FMU may have changed either. */
 static bool rounding_is_usual(void)
 {
     static const volatile double one = 1.0, tiny = 1e-17, smallest = DBL_MIN, half = 0.5;
@@ -101,7 +101,7 @@ static int call_step(const vi_coupling_plan *plan, const vi_coupling_component *
                                   &flags[1], &flags[2], c->last_time);
 }
 
-/* Take where an FMI 3.0 component says that its step has ended; false where that is not for this loop to judge. */
+/* Take the end of a step from an FMI 3.0 component; false where the importer must judge it. */
 static bool take_end(const vi_coupling_plan *plan, vi_coupling_component *c)
 {
     const double size = *c->step_size, end = *c->step_time + size, reached = *c->last_time;
@@ -119,7 +119,7 @@ static bool take_end(const vi_coupling_plan *plan, vi_coupling_component *c)
     return true;
 }
 
-/* Take the events that an FMI 2.0 component reports of the step just made; NaN is none. */
+/* Take the events that an FMI 2.0 component reports for the step just made; NaN: none. */
 static double reported(const vi_coupling_plan *plan, vi_coupling_component *c, const vi_coupling_run *r, bool *is_there)
 {
     const double *times = c->event_times.calls->values, goal = r->goal;
@@ -138,7 +138,7 @@ static double reported(const vi_coupling_plan *plan, vi_coupling_component *c, c
     return *is_there ? goal : first;
 }
 
-/* The size of a step to the goal as a component takes it, which is one size alone for some; 0 where it takes no such. */
+/* Size of a component's step to the goal; 0 where the component takes only steps of another size. */
 static double size_of_step(const vi_coupling_plan *plan, const vi_coupling_component *c, const vi_coupling_run *r)
 {
     const double size = r->goal - r->start;
@@ -148,7 +148,7 @@ static double size_of_step(const vi_coupling_plan *plan, const vi_coupling_compo
     return fabs(size - c->only_step) <= plan->step_rounding * c->only_step ? c->only_step : 0.0;
 }
 
-/* Step component `i` towards the goal; `reached` is where its first event is, or the goal. */
+/* Step component `i` towards the goal; `reached` is the time of its first event, or the goal. */
 static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i, double *reached, bool *has_event)
 {
     vi_coupling_component *c = &plan->components[i];
@@ -166,11 +166,11 @@ static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i,
     }
     if (c->step.kind == VI_CALL_STEP2) {
         c->time = *c->step_time + *c->step_size;
-        const int came_to = make_all(plan, r, &c->event_times);
-        if (came_to == GO_ON && c->event_times.count > 0) {
+        const int result = make_all(plan, r, &c->event_times);
+        if (result == GO_ON && c->event_times.count > 0) {
             *reached = reported(plan, c, r, has_event);
         }
-        return came_to;
+        return result;
     }
     if (c->flags[1] != 0 || !take_end(plan, c)) {
         return VI_COUPLING_STEPPED;
@@ -184,20 +184,20 @@ static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i,
 
 /* ---- the step of all ---- */
 
-/* Step all towards the goal. The first may end it early, and those after it follow; OVERTAKEN: one of them has met an
- * earlier event, at `reached`. */
+/* Step all components towards the goal. The first component may end the step early, and the others follow. OVERTAKEN: a
+ * later component has met an earlier event, at `reached`. */
 static int step_all(const vi_coupling_plan *plan, vi_coupling_run *r, bool may_repeat)
 {
     r->arrived = 0;
     for (int32_t i = 0; i < plan->count; ++i) {
         double reached;
         bool has_event;
-        int came_to = make_all(plan, r, &plan->components[i].inputs);
-        if (came_to == GO_ON) {
-            came_to = step_one(plan, r, i, &reached, &has_event);
+        int result = make_all(plan, r, &plan->components[i].inputs);
+        if (result == GO_ON) {
+            result = step_one(plan, r, i, &reached, &has_event);
         }
-        if (came_to != GO_ON) {
-            return came_to;
+        if (result != GO_ON) {
+            return result;
         }
         if (reached < r->goal) {
             const bool ends_it = i == 0 && reached > r->start && plan->components[i].event_mode;
@@ -218,20 +218,20 @@ static int step_all(const vi_coupling_plan *plan, vi_coupling_run *r, bool may_r
     return GO_ON;
 }
 
-/* Step all to the first event of any. */
+/* Step all components to the first event of any. */
 static int step_together(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
 {
     r->goal = r->target;
     for (int k = 0; k < MOST_REPETITIONS; ++k) {
-        int came_to = step_all(plan, r, plan->saves && k + 1 < MOST_REPETITIONS);
-        if (came_to != OVERTAKEN) {
-            return came_to;
+        int result = step_all(plan, r, plan->saves && k + 1 < MOST_REPETITIONS);
+        if (result != OVERTAKEN) {
+            return result;
         }
         p->repeated_steps += 1;
         r->goal = r->reached;
-        came_to = restore_all(plan, r);
-        if (came_to != GO_ON) {
-            return came_to;
+        result = restore_all(plan, r);
+        if (result != GO_ON) {
+            return result;
         }
     }
     return VI_COUPLING_STEPPED;
@@ -249,20 +249,20 @@ static bool any_decision(const vi_coupling_plan *plan, int which)
     return false;
 }
 
-/* Carry values and update discrete states until all are settled. */
+/* Carry values and update discrete states until all components are settled. */
 static int resolve(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int came_to = make_all(plan, r, &plan->begin);
-    for (int32_t k = 1; came_to == GO_ON && any_decision(plan, 0); ++k) {
-        came_to = make_all(plan, r, &plan->again);
-        if (came_to == GO_ON && k == plan->most_iterations) {
+    int result = make_all(plan, r, &plan->begin);
+    for (int32_t k = 1; result == GO_ON && any_decision(plan, 0); ++k) {
+        result = make_all(plan, r, &plan->again);
+        if (result == GO_ON && k == plan->most_iterations) {
             return VI_COUPLING_ENDLESS;
         }
     }
-    if (came_to == GO_ON && any_decision(plan, 1)) {
+    if (result == GO_ON && any_decision(plan, 1)) {
         r->wants_to_end = 1;
     }
-    return came_to == GO_ON ? make_all(plan, r, &plan->leave) : came_to;
+    return result == GO_ON ? make_all(plan, r, &plan->leave) : result;
 }
 
 static void note(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
@@ -303,17 +303,17 @@ static int step(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupli
 {
     r->start = p->time;
     r->target = p->next_point < r->end ? p->next_point : r->end;
-    int came_to = make_all(plan, r, &plan->start);
-    if (came_to == GO_ON && plan->saves) {
-        came_to = save_all(plan, r);
+    int result = make_all(plan, r, &plan->start);
+    if (result == GO_ON && plan->saves) {
+        result = save_all(plan, r);
     }
-    if (came_to == GO_ON) {
-        came_to = step_together(plan, p, r);
+    if (result == GO_ON) {
+        result = step_together(plan, p, r);
     }
-    return came_to == GO_ON ? finish(plan, p, r) : came_to;
+    return result == GO_ON ? finish(plan, p, r) : result;
 }
 
-/* Find the next communication point, a multiple of the macro step that lies ahead. */
+/* Find the next communication point: the next multiple of the macro step. */
 static bool pass_point(const vi_coupling_run *r, vi_coupling_progress *p, double room)
 {
     if (r->macro_step <= room) {
@@ -338,9 +338,9 @@ VI_DOOR int vi_door_coupling(const vi_coupling_plan *plan, vi_coupling_progress 
         if (progress->next_point - time <= room && !pass_point(run, progress, room)) {
             return VI_COUPLING_LISTEN;
         }
-        const int came_to = step(plan, progress, run);
-        if (came_to != GO_ON) {
-            return came_to;
+        const int result = step(plan, progress, run);
+        if (result != GO_ON) {
+            return result;
         }
         if (vi_seconds_since(call) >= run->most_seconds) {
             return VI_COUPLING_LISTEN;

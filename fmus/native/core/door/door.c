@@ -15,7 +15,7 @@ typedef struct {
     vi_contact contact;
     vi_record record;
     double root;   /* sqrt(mass) */
-    vi_scan *scan; /* NULL: one flight is not worth it */
+    vi_scan *scan; /* NULL: one flight does not repay it */
 } body;
 
 static vi_structure parts_of(body *b)
@@ -93,7 +93,7 @@ VI_DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double ph
                               double position, int side, double duration, double contact[2])
 {
     body b;
-    /* an external law: stop there, resolve nothing */
+    /* an external law stops there and resolves nothing */
     const vi_contact stop = {.law = vi_contact_law_asking(), .side = side, .position = position};
     if (!start(&b, oscillator, phase, state, &stop)) {
         return -1;
@@ -128,7 +128,7 @@ VI_DOOR int vi_door_motion(const vi_door_oscillator *oscillator, double phase, c
         return -1;
     }
     vi_scan scan;
-    scan.modes = 0; /* nothing is made yet */
+    scan.modes = 0; /* the cache is empty */
     b.scan = &scan;
     double reached = 0.0;
     for (int i = 0; i < count; ++i) {

@@ -17,7 +17,7 @@ VI_DOOR size_t vi_door_correlation_tables(void)
     return VI_CORRELATION_TABLES;
 }
 
-/* Whether a number is 1, 9/8, ... 15/8 times a power of two, far enough from the ends of the range. */
+/* Is a number 1, 9/8, ... 15/8 times a power of two, far enough from the ends of the range? */
 static bool on_ladder(double lowest)
 {
     int exponent;

@@ -1,6 +1,7 @@
-/* The functions that vibroimpact.fmus.core calls for measuring chains: blocks of samples, by the functions that the FMUs are made of.
+/* The functions that vibroimpact.fmus.core calls for measuring chains: blocks of samples, by the functions of the FMUs.
  *
- * What is said of a number in the headers of `measuring` is checked by whoever calls. */
+ * The caller must check the ranges that the headers of `measuring` state.
+ */
 #ifndef VIBROIMPACT_DOOR_MEASURING_H
 #define VIBROIMPACT_DOOR_MEASURING_H
 
@@ -11,11 +12,11 @@
 
 size_t vi_door_cell_size(void);
 
-/* Set up, settled under `force` at `time`. */
+/* Start a cell settled under `force` at `time`. */
 void vi_door_cell_start(vi_cell *cell, const vi_cell_settings *settings, double time, double force);
 
-/* The output at `count` ascending instants under a force that goes straight between those given, with impacts in ascending order, none
- * later than the last instant. Returns 0; 1 when too many half sines overlap. */
+/* Output of the cell at `count` ascending instants, under a force that is linear between the given forces. The impacts
+ * ascend, and none is later than the last instant. Returns 0; 1 when too many half sines overlap. */
 int vi_door_cell_follow(vi_cell *cell, size_t count, const double times[], const double forces[], size_t hits,
                         const double hit_times[], const double impulses[], double volts[]);
 
@@ -23,7 +24,7 @@ void vi_door_gaussian(uint64_t seed, uint64_t channel, uint64_t first, size_t co
 void vi_door_digitised(size_t count, const double volts[], double highest, int bits, double digitised[]);
 void vi_door_reading(size_t count, const double values[], double gain, double offset, double highest, double volts[]);
 
-/* Returns the number of the first sample at which body and exciter touch, or `count`. */
+/* Returns the number of the first sample at which body and exciter touch, or `count` when none does. */
 size_t vi_door_magnet(size_t count, const double volts[], const double displacements[], double gain, double offset,
                       double distance, int side, double forces[]);
 

@@ -49,7 +49,7 @@ VI_DOOR int vi_door_beam_shapes(int boundary, int count, int points, const doubl
     return 0;
 }
 
-/* 1: numbers that mean nothing; 2: points that cannot be told apart, or from a support. */
+/* Returns 0; 1 for invalid numbers; 2 for points too close to each other or to a support. */
 static int find_residual(int boundary, int natural, int points, const double point[], vi_beam_residual *residual)
 {
     if (!in_range(boundary, natural) || points < 1 || points > VI_PORTS || !on_beam(points, point)) {

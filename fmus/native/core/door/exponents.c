@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Make the columns orthonormal, one after the other, twice for rounding; add the logarithms of their lengths. */
+/* Make the columns orthonormal, one after the other, twice against rounding; add the logarithms of their lengths. */
 static void orthonormalize(int n, double column[][VI_ORBIT_STATES], double stretch[])
 {
     for (int k = 0; k < n; ++k) {

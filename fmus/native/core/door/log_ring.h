@@ -1,7 +1,7 @@
-/* The last lines that a component logged, kept in memory that the importer gives (shared memory survives a crash).
+/* The last lines logged by a component, in memory given by the importer (shared memory survives a crash).
  *
- * A component may log without end: nothing is allocated and nothing calls back into Python. FMI 2.0's logger is
- * variadic, which Python cannot receive.
+ * A component may log without end, so the ring allocates no memory and never calls Python. Python cannot receive FMI
+ * 2.0's logger, which is variadic.
  */
 #ifndef VIBROIMPACT_LOG_RING_H
 #define VIBROIMPACT_LOG_RING_H
@@ -11,10 +11,10 @@
 
 #include "door/door.h"
 
-enum { VI_LOG_LINES = 20, VI_LOG_LENGTH = 480 };
+enum { VI_LOG_LINES = 20, VI_LOG_LENGTH = 480 }; /* lines kept; characters of a line with its end */
 
 typedef struct {
-    uint64_t count; /* lines logged so far; line i is in lines[i % VI_LOG_LINES] */
+    uint64_t count; /* number of lines logged so far; line i is in lines[i % VI_LOG_LINES] */
     char lines[VI_LOG_LINES][VI_LOG_LENGTH];
 } vi_log_ring;
 

@@ -4,15 +4,15 @@
 
 #include "motion/majorant.h"
 
-/* Least step of the search for maxima, as a share of a flight. */
+/* Least step of the search for maxima, as a share of the flight's length. */
 static const double LEAST_STEP = 1e-13;
 
-/* A contact in a flight: how far beyond its stop, its first two derivatives, and a bound of the third from here on. */
+/* A contact in a flight: distance beyond its stop, the first two derivatives, and a bound of the third from here on. */
 typedef struct {
     double beyond, velocity, acceleration, bound;
 } seen;
 
-/* `state`: of all modes where the flight starts, at forcing phase `phase`. */
+/* Find these for a contact `u` seconds after the start of a flight in modal `state` at forcing phase `phase`. */
 static seen look(const vi_orbit_response *response, int contact, const double state[], double phase, double u)
 {
     const vi_orbit_body *body = response->body;
@@ -55,8 +55,8 @@ static void keep(double what[3], double beyond, double phase, int contact)
     }
 }
 
-/* All maxima of a contact inside a flight of `length` seconds; returns its velocity at the end. Steps end before the
- * velocity may be zero, so its sign changes over least steps alone. */
+/* Find all maxima of a contact within a flight of `length` seconds; returns its velocity at the end. Certified steps
+ * end before a zero of the velocity, so its sign changes only over least steps. */
 static double search(const vi_orbit_response *response, int contact, const double state[], double phase, double length,
                      double what[3])
 {
@@ -94,7 +94,7 @@ VI_DOOR int vi_door_orbit_maximum(const vi_orbit_body *body, const vi_orbit_trai
         for (int contact = 0; contact < body->contacts; ++contact) {
             const double length = vi_orbit_since(&response, next, i);
             const double arriving = search(&response, contact, start, train->phase[i], length, what);
-            /* an impact elsewhere may turn this contact round */
+            /* an impact elsewhere may reverse this contact */
             if (contact != train->contact[next] && arriving > 0.0) {
                 const seen left = look(&response, contact, after, train->phase[next], 0.0);
                 if (left.velocity <= 0.0) {

@@ -33,8 +33,7 @@ static bool is_train(const vi_orbit_train *train, int contacts)
     return good && train->phase[train->impacts - 1] - train->phase[0] < TURN * train->periods;
 }
 
-/* The state just after an impulse that comes once in each train: (1 - Phi(T))^-1 (0, 1), without the cancellations of
- * light damping. */
+/* The state just after an impulse once in each train: (1 - Phi(T))^-1 (0, 1), free of cancellation at light damping. */
 static bool start_of_train(const vi_mode *mode, double length, double start[2])
 {
     double phi[4];
@@ -49,7 +48,7 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
         whole = expm1(-mode->slow * length) * expm1(-mode->fast * length);
         moved = 1.0 - phi[0];
     }
-    /* an undamped mode that returns after whole turns: the angle, and so 1 - Phi, is known to its rounding alone */
+    /* an undamped mode after whole turns: only rounding is left of 1 - Phi */
     const double rounding = 4.0 * DBL_EPSILON * (1.0 + mode->natural * length);
     if (!(whole > rounding * rounding)) {
         return false;
@@ -166,7 +165,7 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
     const double *shape = body->shape + (ptrdiff_t)contact * modes;
     const double *impulse = body->impulse + (ptrdiff_t)contact * modes;
     const double lost = 1.0 + body->restitution[contact], speed = body->direction[contact] * velocity;
-    double acceleration = 0.0; /* of the contact before the impact */
+    double acceleration = 0.0; /* of the contact, before the impact */
     for (int j = 0; j < modes; ++j) {
         const vi_mode *mode = &response->mode[j];
         const double before = state[modes + j] + lost * speed * impulse[j];

@@ -1,4 +1,4 @@
-/* What the modes of a body answer to its force and to a periodic train of impacts. */
+/* Responses of a body's modes to its force and to a periodic train of impacts. */
 #ifndef VIBROIMPACT_ORBIT_RESPONSE_H
 #define VIBROIMPACT_ORBIT_RESPONSE_H
 
@@ -8,14 +8,14 @@
 #include "motion/flow.h"
 #include "sizes.h"
 
-enum { VI_ORBIT_IMPACTS = 64, VI_ORBIT_STATES = 2 * VI_MODES };
+enum { VI_ORBIT_IMPACTS = 64, VI_ORBIT_STATES = 2 * VI_MODES }; /* most impacts of an orbit; states of a body */
 
-/* What a call ends with. */
+/* Results of a call. */
 enum {
     VI_ORBIT_DONE = 0,
-    VI_ORBIT_REFUSED = 1,  /* numbers out of their range */
-    VI_ORBIT_RESONANT = 2, /* an undamped mode answers the force, or its impacts, without bound */
-    VI_ORBIT_SINGULAR = 3  /* no velocities belong to these phases */
+    VI_ORBIT_REFUSED = 1,  /* numbers outside their range */
+    VI_ORBIT_RESONANT = 2, /* an undamped mode's response to the force, or to its impacts, is unbounded */
+    VI_ORBIT_SINGULAR = 3  /* no velocities solve the equations for these phases */
 };
 
 /* A body of mass-normalised modes; shapes are [contact][mode]. */
@@ -27,13 +27,13 @@ typedef struct {
     const double *cosine, *sine;  /* [modes] modal force = cosine cos(phase) + sine sin(phase) */
     const double *held;           /* [modes] constant modal force */
     const double *shape;          /* displacement of each contact */
-    const double *impulse; /* modal velocities that a unit of velocity at the contact takes: shape . impulse = 1 */
+    const double *impulse; /* modal velocities that take a unit of velocity from the contact: shape . impulse = 1 */
     const double *direction; /* [contacts] +1: the stop is above, -1: below */
     const double *position; /* [contacts] m */
     const double *restitution; /* [contacts] */
 } vi_orbit_body;
 
-/* Impacts in their order: of which contact, and at which phase, rad, 0 <= phase[0] < phase[1] < ... < 2 pi periods. */
+/* Impacts in their order: the contact and the phase of each, rad, 0 <= phase[0] < phase[1] < ... < 2 pi periods. */
 typedef struct {
     int32_t impacts, periods;
     const int32_t *contact;
@@ -46,33 +46,33 @@ typedef struct {
     double length; /* of the train, s */
     vi_mode mode[VI_MODES];
     double steady_cos[VI_MODES], steady_sin[VI_MODES], level[VI_MODES];
-    double start[VI_MODES][2]; /* displacement and velocity just after an impact, of a unit impulse in each train */
+    double start[VI_MODES][2]; /* displacement and velocity just after a unit impulse that recurs in each train */
 } vi_orbit_response;
 
-/* The modes and their steady answers alone. Returns one of VI_ORBIT_*. */
+/* Find the modes and their steady responses only. Returns one of VI_ORBIT_*. */
 int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body);
 
-/* All of it, for a train of impacts. Returns one of VI_ORBIT_*. */
+/* Find all members for a train of impacts. Returns one of VI_ORBIT_*. */
 int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, const vi_orbit_train *train);
 
-/* Time from impact k to impact i, s: above 0, and a whole train from an impact to itself. */
+/* Time from impact k to impact i, s; > 0, and a whole train from an impact to itself. */
 double vi_orbit_since(const vi_orbit_response *response, int i, int k);
 
-/* Answer of mode j, `u` after the impact, to unit speeds taken off it, once in each train. */
+/* Response of mode j, `u` seconds after an impact that takes a unit of speed, once in each train. */
 void vi_orbit_train_answer(const vi_orbit_response *response, int j, double u, double *x, double *v);
 
-/* Steady answer of mode j to the force. */
+/* Steady response of mode j to the force. */
 void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v);
 
-/* An impact on a change of the state before it, change[2 modes][columns]: equations.md 4.2. `velocity`: towards the stop
- * before it, m/s; `state`: of all modes after it. */
+/* Apply an impact to a change of the state before it, change[2 modes][columns]: equations.md 4.2. `velocity`: towards
+ * the stop before the impact, m/s; `state`: of all modes after the impact. */
 void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase, double velocity, const double state[],
                    int columns, double change[][VI_ORBIT_STATES]);
 
-/* Flight of `u` seconds on a change of the state. */
+/* Apply a flight of `u` seconds to a change of the state. */
 void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES]);
 
-/* Steady answer at the contact of impact i, in its direction: beyond the stop, and its first two derivatives. */
+/* Steady response at the contact of impact i: distance beyond its stop, and the first two derivatives. */
 void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3]);
 
 #endif

@@ -6,7 +6,7 @@
 
 /* ---- linear equations of the velocities ---- */
 
-/* Solve a x = b for several right sides, b[row][sides], by elimination with pivots; false where a is singular. */
+/* Solve a x = b for several right-hand sides, b[row][sides], by elimination with pivots; false where a is singular. */
 static bool solve(int n, double a[][VI_ORBIT_IMPACTS], int sides, double b[][VI_ORBIT_IMPACTS + 1])
 {
     for (int k = 0; k < n; ++k) {
@@ -48,7 +48,7 @@ static bool solve(int n, double a[][VI_ORBIT_IMPACTS], int sides, double b[][VI_
     return true;
 }
 
-/* Displacement at the contact of impact i for a unit speed of impact k, and its first and second derivative over time. */
+/* Displacement at the contact of impact i for a unit speed of impact k, with its first and second time derivatives. */
 static void answer(const vi_orbit_response *response, int i, int k, double g[3])
 {
     const vi_orbit_body *body = response->body;
@@ -97,7 +97,7 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
     for (int i = 0; i < n; ++i) {
         velocity[i] = right[i][0];
     }
-    /* right sides of the velocities' derivatives over the time of each impact */
+    /* right-hand sides of the velocities' derivatives over the time of each impact */
     for (int i = 0; i < n; ++i) {
         double own = steady[i][2];
         distance[i] = steady[i][0];

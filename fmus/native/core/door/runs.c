@@ -7,7 +7,7 @@
 
 enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
 enum { NOT_BEGUN = 0, BEFORE_RECORDING = 1, RECORDING = 2, AT_END = 3 };
-/* What a piece of a run comes to, beside VI_RUNS_*. */
+/* Results of a part of a run, besides VI_RUNS_*. */
 enum { GO_ON = 0, RUN_ENDS = -1 };
 
 static bool went_well(int status)
@@ -15,7 +15,7 @@ static bool went_well(int status)
     return status >= 0 && status <= STATUS_WARNING;
 }
 
-/* Start where the run before ended, on the stop that has moved beyond it. */
+/* Start where the previous run ended; a body beyond a stop that has moved starts on this stop at rest. */
 static void carry(const vi_runs_plan *plan, const double carried[2], double values[])
 {
     double displacement = carried[0], velocity = carried[1];
@@ -63,7 +63,7 @@ static int begin(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points 
     return good ? GO_ON : VI_RUNS_REFUSED;
 }
 
-/* Take the rows that the body has recorded. */
+/* Take the rows recorded by the body. */
 static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
 {
     if (p->rows_room - p->rows_used < plan->row_capacity) {
@@ -87,7 +87,7 @@ static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_poi
     return GO_ON;
 }
 
-/* One step towards `end`; RUN_ENDS where the run has come to its limit. */
+/* Make one step towards `end`; RUN_ENDS where the run has reached its limit. */
 static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
 {
     bool needs_event = false, ends = false, early = false;
@@ -106,7 +106,7 @@ static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
     return GO_ON;
 }
 
-/* Advance to `end`. The rows are taken where a step has ended early, and there is time to listen. */
+/* Advance to `end`. After a step that ended early, rows are taken and the time is checked. */
 static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double end, double call)
 {
     while (p->time < end) {
@@ -117,15 +117,15 @@ static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_point
         if (p->rows_room - p->rows_used < plan->row_capacity) {
             return VI_RUNS_FULL;
         }
-        int came_to = step(f, p, end);
-        if (came_to == GO_ON && p->time < end) {
-            came_to = take_rows(f, plan, p);
-            if (came_to == GO_ON && vi_seconds_since(call) >= p->most_seconds) {
-                came_to = VI_RUNS_LISTEN;
+        int result = step(f, p, end);
+        if (result == GO_ON && p->time < end) {
+            result = take_rows(f, plan, p);
+            if (result == GO_ON && vi_seconds_since(call) >= p->most_seconds) {
+                result = VI_RUNS_LISTEN;
             }
         }
-        if (came_to != GO_ON) {
-            return came_to;
+        if (result != GO_ON) {
+            return result;
         }
     }
     return GO_ON;
@@ -133,9 +133,9 @@ static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_point
 
 static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
 {
-    const int came_to = take_rows(f, plan, p);
-    if (came_to != GO_ON) {
-        return came_to;
+    const int result = take_rows(f, plan, p);
+    if (result != GO_ON) {
+        return result;
     }
     double *finals = p->finals + (size_t)p->at * plan->finals.count;
     bool *flags = p->flags + (size_t)p->at * plan->flags.count;
@@ -155,32 +155,32 @@ static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points
     return GO_ON;
 }
 
-/* Run the point under way to its end. */
+/* Run the present point to its end. */
 static int go_on(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double call)
 {
-    int came_to = GO_ON;
+    int result = GO_ON;
     if (p->stage == NOT_BEGUN) {
         p->outcome[p->at] = VI_RUN_ENDED;
         p->give_up = 0;
-        came_to = begin(f, plan, p);
+        result = begin(f, plan, p);
     }
-    if (came_to == GO_ON && p->stage == BEFORE_RECORDING) {
-        came_to = advance(f, plan, p, p->begin[p->at], call);
-        if (came_to == GO_ON) {
+    if (result == GO_ON && p->stage == BEFORE_RECORDING) {
+        result = advance(f, plan, p, p->begin[p->at], call);
+        if (result == GO_ON) {
             const bool good = went_well(f->set_boolean(f->instance, plan->switches.references, plan->switches.count,
                                                        plan->switch_values, plan->switches.count));
-            came_to = good ? GO_ON : VI_RUNS_REFUSED;
+            result = good ? GO_ON : VI_RUNS_REFUSED;
             p->stage = RECORDING;
         }
     }
-    if (came_to == GO_ON && p->stage == RECORDING) {
-        came_to = advance(f, plan, p, p->end[p->at], call);
+    if (result == GO_ON && p->stage == RECORDING) {
+        result = advance(f, plan, p, p->end[p->at], call);
     }
-    if (came_to == GO_ON || came_to == RUN_ENDS) {
+    if (result == GO_ON || result == RUN_ENDS) {
         p->stage = AT_END;
-        came_to = finish(f, plan, p);
+        result = finish(f, plan, p);
     }
-    return came_to;
+    return result;
 }
 
 VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_runs_points *points)
@@ -188,12 +188,12 @@ VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_ru
     const double call = vi_seconds_now();
     double since = call;
     while (points->at < points->count) {
-        const int came_to = go_on(fmu, plan, points, call);
+        const int result = go_on(fmu, plan, points, call);
         const double now = vi_seconds_now();
         points->spent += now > since ? now - since : 0.0;
         since = now;
-        if (came_to != GO_ON) {
-            return came_to;
+        if (result != GO_ON) {
+            return result;
         }
         points->seconds[points->at] = points->spent;
         points->at += 1;

@@ -1,8 +1,7 @@
 /* Many runs of one body, one after the other: the loop over the points of a chunk.
  *
- * The runs are those of an instance of the body's FMU, by the very calls that an importer makes for one of them, so that
- * their rows are the same bit for bit. What is done with a run that the body refuses, or has something to say of, is the
- * importer's: the loop stops there.
+ * The runs use an instance of the body's FMU with the calls of an importer, so that their rows are the same bit for
+ * bit. The loop stops at a run that the body refuses or logs a message about; the importer then acts.
  */
 #ifndef VIBROIMPACT_RUNS_H
 #define VIBROIMPACT_RUNS_H
@@ -14,18 +13,18 @@
 #include "door/door.h"
 #include "door/log_ring.h"
 
-/* Why vi_door_runs returns. */
+/* Reasons why vi_door_runs returns. */
 enum {
     VI_RUNS_DONE = 0,    /* all points have run */
-    VI_RUNS_LISTEN = 1,  /* it has taken as long as it was to; call again to go on */
+    VI_RUNS_LISTEN = 1,  /* most_seconds are over; call again to go on */
     VI_RUNS_FULL = 2,    /* the rows need more room: take them, then call again */
-    VI_RUNS_REFUSED = 3  /* the point `at` is for the importer: it failed, or its body has logged something */
+    VI_RUNS_REFUSED = 3  /* the importer must treat point `at`: it failed, or its body logged a message */
 };
 
-/* How a run ended; 0 and 1 as `analysis/dataset/schema.py` has them. */
+/* End of a run; 0 and 1 are numbers of `analysis/dataset/schema.py`. */
 enum { VI_RUN_ENDED = 0, VI_RUN_IMPACT_LIMIT = 2, VI_RUN_TIMEOUT = 5 };
 
-/* The functions of FMI 3.0 that are called, of one instance. */
+/* The functions of FMI 3.0 that the loop calls, for one instance. */
 typedef struct {
     void *instance;
     int (*reset)(void *);
@@ -47,7 +46,7 @@ typedef struct {
     size_t count;
 } vi_runs_variables;
 
-/* What all points have in common. */
+/* Everything that all points share. */
 typedef struct {
     vi_runs_variables parameters, integers, booleans; /* set before initialization */
     const int64_t *integer_values;
@@ -57,14 +56,14 @@ typedef struct {
     vi_runs_variables finals, flags; /* read at the end */
     uint32_t record_count, record_taken, record_rows;
     int32_t row_capacity; /* of the body's record */
-    /* A run of a branch starts from the state where the one before ended: the places of displacement, velocity and phase
-     * among the parameters. What lies beyond stop k, which has moved, is put on it, at rest. */
+    /* A run of a branch starts from the final state of the previous run: places of displacement, velocity and phase
+     * among the parameters. A body beyond stop k, which has moved, starts on it at rest. */
     int32_t chained, displacement, velocity, phase, stops;
-    const int32_t *stop_position; /* [stops] among the parameters */
-    const double *stop_direction; /* [stops] +1 for a stop above the motion, -1 below, 0 for one that yields */
+    const int32_t *stop_position; /* [stops] places among the parameters */
+    const double *stop_direction; /* [stops] +1 for a stop above the motion, -1 below, 0 for a stop that yields */
 } vi_runs_plan;
 
-/* The points, and how far they are. Arrays are [point] or [point][...]. */
+/* The points and their progress. Arrays are [point] or [point][...]. */
 typedef struct {
     int64_t count;
     double *values;             /* [point][parameters] */
@@ -73,20 +72,20 @@ typedef struct {
     int8_t *outcome;
     double *reached, *seconds, *finals;
     bool *flags;
-    int64_t *rows_of; /* rows of each */
+    int64_t *rows_of; /* number of rows of each point */
     double *rows;     /* [rows_room][VI_RECORD_WIDTH] */
     int64_t rows_room, rows_used;
-    double carried[2]; /* where the next run of the branch starts */
+    double carried[2]; /* start state of the branch's next run */
     int32_t has_carried;
-    int32_t give_up;  /* the point under way has taken long enough */
-    double most_seconds; /* of one call; it is heard between two points and where a step ends early */
-    int64_t at;       /* the point under way */
-    int32_t stage;    /* of it: 0 not begun, 1 before the recording, 2 in it, 3 at its end */
-    double time;      /* it has reached, s */
-    double spent;     /* on it, s */
+    int32_t give_up;  /* the present point has taken too long */
+    double most_seconds; /* of one call; checked between points and where a step ends early */
+    int64_t at;       /* the present point */
+    int32_t stage;    /* of this point: 0 not begun, 1 before the recording, 2 in the recording, 3 at its end */
+    double time;      /* time reached by the point, s */
+    double spent;     /* wall time spent on the point, s */
 } vi_runs_points;
 
-/* Run what is left of the points. Returns one of VI_RUNS_*. */
+/* Run the remaining points. Returns one of VI_RUNS_*. */
 VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_runs_points *points);
 
 #endif

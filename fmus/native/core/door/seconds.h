@@ -1,4 +1,4 @@
-/* Wall time, by which a loop knows that its caller is to be heard. */
+/* Wall time, by which a loop knows when to return to its caller. */
 #ifndef VIBROIMPACT_SECONDS_H
 #define VIBROIMPACT_SECONDS_H
 
@@ -10,7 +10,7 @@ static inline double vi_seconds_now(void)
     return timespec_get(&now, TIME_UTC) != 0 ? (double)now.tv_sec + 1e-9 * (double)now.tv_nsec : 0.0;
 }
 
-/* The clock of the day may be set back. */
+/* Seconds since `then`; 0 if the clock has been set back. */
 static inline double vi_seconds_since(double then)
 {
     const double passed = vi_seconds_now() - then;

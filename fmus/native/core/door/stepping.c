@@ -4,7 +4,7 @@
 #include "door/seconds.h"
 
 enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
-/* Wall time of one call, s: signals and deadlines are heard between two. */
+/* Longest wall time of one call, s; signals and deadlines are handled between calls. */
 static const double MOST_SECONDS = 0.05;
 
 static bool went_well(int status)
@@ -12,7 +12,7 @@ static bool went_well(int status)
     return status >= 0 && status <= STATUS_WARNING;
 }
 
-/* Take the rows that the body has recorded. */
+/* Take the rows recorded by the body. */
 static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block *b)
 {
     if (plan->row_capacity == 0) {
@@ -38,7 +38,7 @@ static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_blo
     return VI_HOLD_DONE;
 }
 
-/* Set the force of the step to sample `at`, which begins here. */
+/* Set the force of the step to sample `at`, which begins now. */
 static int set_force(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_hold_block *b)
 {
     if (b->renewed != NULL && !b->renewed[b->at]) {
@@ -59,7 +59,7 @@ static int set_force(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_ho
     return went_well(f->set_float64(f->instance, inputs, 2, values, 2)) ? VI_HOLD_DONE : VI_HOLD_REFUSED;
 }
 
-/* Advance to sample `at`; a body that has worked for long, or whose record is full, ends its step before. */
+/* Advance to sample `at`; a long computation or a full record ends the step earlier. */
 static int advance(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block *b)
 {
     const double end = b->ends[b->at];
@@ -95,16 +95,16 @@ VI_DOOR int vi_door_hold(const vi_runs_fmu *fmu, const vi_hold_plan *plan, vi_ho
 {
     const double call = vi_seconds_now();
     while (block->at < block->count) {
-        int came_to = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
-        if (came_to == VI_HOLD_DONE) {
+        int result = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
+        if (result == VI_HOLD_DONE) {
             block->begun = 1;
-            came_to = advance(fmu, plan, block);
+            result = advance(fmu, plan, block);
         }
-        if (came_to == VI_HOLD_DONE) {
-            came_to = read_sample(fmu, plan, block);
+        if (result == VI_HOLD_DONE) {
+            result = read_sample(fmu, plan, block);
         }
-        if (came_to != VI_HOLD_DONE) {
-            return came_to;
+        if (result != VI_HOLD_DONE) {
+            return result;
         }
         block->begun = 0;
         block->at += 1;

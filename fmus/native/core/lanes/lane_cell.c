@@ -6,7 +6,7 @@
 #include "body/landing.h"
 #include "motion/majorant.h"
 
-/* Evaluations of a search in one cell; some tens are usual. */
+/* Most evaluations of a search in one cell; some tens are usual. */
 enum { MOST_SEARCHED = 400 };
 
 void vi_lane_cell_at(const vi_lane_cell *cell, double share, double *displacement, double *slope)
@@ -76,10 +76,10 @@ vi_cell_result vi_lane_cell_search(const vi_lane_cell *cell, double scale, doubl
 
 /* ---- crests ---- */
 
-/* Largest value of sign * q over the cell up to `end`, where it may lie inside: the zeros of the velocity one by one. */
+/* Largest sign * q over the cell up to `end`, if it may lie inside: visits the zeros of the velocity one by one. */
 static double crest(const vi_lane_cell *cell, double sign, double end)
 {
-    vi_lane_cell speed = {{0.0}}; /* of the cell, as a polynomial of its own */
+    vi_lane_cell speed = {{0.0}}; /* slope of the cell as a polynomial */
     for (int n = 1; n <= VI_LANE_ORDER; ++n) {
         speed.term[n - 1] = n * cell->term[n];
     }
@@ -103,7 +103,7 @@ static double crest(const vi_lane_cell *cell, double sign, double end)
     return most;
 }
 
-/* The same where the slope changes its sign once, by Newton's method from a guess on the parabola. */
+/* Largest sign * q where the slope changes its sign once: Newton's method from a guess on the parabola. */
 static double single_crest(const vi_lane_cell *cell, double sign, double end, double first, double last)
 {
     double low = 0.0, high = end, at = end * first / (first - last), q = 0.0;
@@ -124,7 +124,7 @@ static double single_crest(const vi_lane_cell *cell, double sign, double end, do
         if (!(next > low && next < high)) {
             next = 0.5 * (low + high);
         }
-        if (fabs(next - at) <= 1e-9 * end) { /* the value at a crest is flat */
+        if (fabs(next - at) <= 1e-9 * end) { /* values are flat at a crest */
             return vi_max(sign * q, sign * (q + v * 0.5 * (next - at)));
         }
         at = next;
@@ -141,7 +141,7 @@ double vi_lane_cell_crest(const vi_lane_cell *cell, double sign, double end)
     if (vi_min(first, last) > bulge || vi_max(first, last) < -bulge) {
         return -HUGE_VAL; /* monotone */
     }
-    if (2.0 * fabs(cell->term[2]) > third * end) { /* the curvature keeps its sign: one crest, or none */
+    if (2.0 * fabs(cell->term[2]) > third * end) { /* the curvature keeps its sign: at most one crest */
         return first > 0.0 && last < 0.0 ? single_crest(cell, sign, end, first, last) : -HUGE_VAL;
     }
     return crest(cell, sign, end);

@@ -1,9 +1,9 @@
-/* Eight lanes: where their bodies are, and tables of their motion; arrays end in [lane], as vector registers take them.
+/* Eight lanes: the states of their bodies, and tables of their motion; arrays end in [lane], as vector registers need.
  *
- * Time goes by cells of one length for each lane. The motion over a cell is a Taylor polynomial in the share of the cell,
- * linear in (q, p, cosine, sine, 1) at its start: a table of coefficients for each of these five. The states at the ends of
- * the next VI_CELLS cells follow likewise. Nothing here needs a steady response, so resonance, critical damping and slow
- * forcing are like any other motion.
+ * Each lane has cells of time of one length. The motion over a cell is a Taylor polynomial in the share of the cell. It
+ * is linear in (q, p, cosine, sine, 1) at the start, with a table of coefficients for each of the five. So are the
+ * states at the ends of the next VI_CELLS cells. Resonance, critical damping and slow forcing are no special cases, as
+ * no steady response is needed.
  */
 #ifndef VIBROIMPACT_LANE_GROUP_H
 #define VIBROIMPACT_LANE_GROUP_H
@@ -12,22 +12,22 @@
 
 #include "lanes/lane_points.h"
 
-enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 };
+enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 }; /* VI_CELLS: of a round; VI_LANE_ORDER: of the Taylor series */
 
-/* A rebound below this share of the largest approach may begin the end of a chatter: as chatter.c has it. */
+/* Speed of a rebound, relative to the largest approach, below which a chatter may end, as in chatter.c. */
 #define VI_LANE_TAIL 1e-4
 
-/* What a motion is linear in, in the order of the tables. */
+/* Parts in which a motion is linear, in the order of the tables. */
 enum { VI_OF_Q, VI_OF_P, VI_OF_COSINE, VI_OF_SINE, VI_OF_ONE, VI_PARTS };
 
-/* A lane needs more than lockstep. */
+/* Events of a lane that need more than lockstep. */
 enum {
     VI_EVENT_NONE = 0,
-    VI_EVENT_IMPACT = 1, /* that is to be told */
-    VI_EVENT_GOAL = 2,   /* it has come to its goal */
-    VI_EVENT_CELL = 3,   /* the cell that begins where it is now is for the careful search */
-    VI_EVENT_LEAVE = 4,  /* it is for the scalar engine */
-    VI_EVENT_FLIGHT = 5  /* nothing, but its extremes are followed */
+    VI_EVENT_IMPACT = 1, /* an impact to be recorded, or at the impact limit */
+    VI_EVENT_GOAL = 2,   /* the lane has reached its goal */
+    VI_EVENT_CELL = 3,   /* the cell that begins here needs the careful search */
+    VI_EVENT_LEAVE = 4,  /* the point is left to the scalar engine */
+    VI_EVENT_FLIGHT = 5  /* no event, but extremes are followed */
 };
 
 typedef double vi_lane_array[VI_LANES];
@@ -36,62 +36,62 @@ typedef double vi_lane_array[VI_LANES];
 typedef struct {
     vi_lane_array taylor[VI_LANE_ORDER + 1][VI_PARTS]; /* of q over a cell */
     vi_lane_array end_q[VI_CELLS + 1][VI_PARTS], end_p[VI_CELLS + 1][VI_PARTS]; /* after whole cells */
-    vi_lane_array turn_cosine[VI_CELLS + 1], turn_sine[VI_CELLS + 1]; /* of the force, likewise */
+    vi_lane_array turn_cosine[VI_CELLS + 1], turn_sine[VI_CELLS + 1]; /* turn of the force after whole cells */
     vi_lane_array stiffness, drag, root_rate; /* 2 decay, 2 decay + natural */
     vi_lane_array load;                       /* |force| + |held| */
     vi_lane_array span;                       /* VI_CELLS cells, s */
     vi_lane_array observed;                   /* shape of the observed point */
 } vi_one_mode;
 
-/* Lengths of cells of a body of several modes: each of the next is a quarter of the one before. */
+/* Lengths of cells for bodies of several modes: each level has a quarter of the length of the one before. */
 enum { VI_LEVELS = 5, VI_POINTS = VI_LANES_CONTACTS + 1 };
 
-/* Tables of a body of several modes. Its motion is the steady response, and what each mode does without a force. Rows of
- * points are those of the contacts, towards their stops, then the observed point's. */
+/* Tables of a body of several modes. Its motion is the steady response plus the unforced motion of each mode. Rows of
+ * points: the contacts, towards their stops, then the observed point. */
 typedef struct {
     vi_lane_array step[VI_LEVELS][VI_LANES_MODES][4]; /* (q, p) after a cell: q of q, of p; p of q, of p */
     vi_lane_array turn_cosine[VI_LEVELS], turn_sine[VI_LEVELS];
-    vi_lane_array cells[VI_LEVELS], rate[VI_LEVELS];  /* length of a cell in shortest ones; 1/s */
-    /* most that a displacement, for unit amplitudes of the modes and of the force, differs from a line over a cell */
+    vi_lane_array cells[VI_LEVELS], rate[VI_LEVELS];  /* length of a cell in shortest cells; 1/s */
+    /* largest deviation of a displacement from a line over a cell, for unit amplitudes of the modes and of the force */
     vi_lane_array bulge[VI_LEVELS][VI_POINTS][VI_LANES_MODES + 1];
-    vi_lane_array tilt[VI_LEVELS][VI_LANES_MODES + 1]; /* the same of the observed point's velocity */
+    vi_lane_array tilt[VI_LEVELS][VI_LANES_MODES + 1]; /* the same for the observed velocity */
     vi_lane_array leaving[VI_LANES_CONTACTS][VI_LANES_MODES + 1]; /* third derivative / 24 over a shortest cell's cube */
     vi_lane_array shape[VI_POINTS][VI_LANES_MODES];
-    vi_lane_array cosine[VI_POINTS], sine[VI_POINTS], offset[VI_POINTS]; /* steady response; level less the stop */
-    vi_lane_array mix[VI_LANES_MODES], reach[VI_LANES_MODES]; /* amplitude |q| + |p + mix q| reach, or less */
-    vi_lane_array level, start_level, last;           /* of the cells now; in the last round; of the shortest ones */
-    /* of the careful search */
+    vi_lane_array cosine[VI_POINTS], sine[VI_POINTS], offset[VI_POINTS]; /* steady response; level minus stop */
+    vi_lane_array mix[VI_LANES_MODES], reach[VI_LANES_MODES]; /* amplitude <= |q| + |p + mix q| reach */
+    vi_lane_array level, start_level, last;           /* level: present; in the last round; shortest */
+    /* for the careful search */
     vi_lane_array stiffness[VI_LANES_MODES], decay[VI_LANES_MODES];
     vi_lane_array steady_cosine[VI_LANES_MODES], steady_sine[VI_LANES_MODES], rest[VI_LANES_MODES];
-    vi_lane_array kick[VI_LANES_CONTACTS][VI_LANES_MODES]; /* modal velocities that take a unit of approach */
-    vi_lane_array size[VI_LANES_CONTACTS];            /* of what does not move in a clearance, m */
+    vi_lane_array kick[VI_LANES_CONTACTS][VI_LANES_MODES]; /* modal velocities that take away a unit of approach */
+    vi_lane_array size[VI_LANES_CONTACTS];            /* of the terms of a clearance that do not move, m */
 } vi_many_modes;
 
 typedef struct {
-    /* of the body */
-    vi_lane_array cell, cell_rate;            /* shortest length of a cell, s; 1/s */
+    /* the body */
+    vi_lane_array cell, cell_rate;            /* shortest cell, s; its reciprocal, 1/s */
     vi_lane_array angular_frequency, period, period_low;
-    vi_lane_array sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS]; /* one mode: free where sign q < limit */
+    vi_lane_array sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS]; /* one mode: free while sign q < limit */
     vi_lane_array restitution[VI_LANES_CONTACTS], yield_velocity[VI_LANES_CONTACTS]; /* one mode: over |shape| */
     vi_lane_array resolution[VI_LANES_CONTACTS]; /* squared approach below which a touch may be no impact */
-    vi_lane_array most_impacts;               /* at this count the lane tells */
-    /* where it is: modal displacements and velocities; of several modes, without the steady response and the level */
+    vi_lane_array most_impacts;               /* number of impacts that makes an event */
+    /* the state: modal displacements and velocities; for several modes, without the steady response and the level */
     vi_lane_array q[VI_LANES_MODES], p[VI_LANES_MODES];
     vi_lane_array periods, rest, rest_low;
     vi_lane_array goal_periods, goal_rest, goal_rest_low;
-    vi_lane_array on;                         /* number of the contact that it has just left, from 1; 0: none */
+    vi_lane_array on;                         /* number of the contact just left, from 1; 0: none */
     vi_lane_array fastest_impact, impacts;
-    vi_lane_array tells, follows;             /* 1: each impact is told; extremes are followed */
-    /* of the last round: from where it went through whole cells and a share of one more */
+    vi_lane_array reports, follows;           /* 1: each impact is an event; extremes are followed */
+    /* the last round: its start, whole cells passed and the share of one more */
     vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
     vi_lane_array passed, share;
-    vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed */
+    vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
     vi_one_mode one;
     vi_many_modes many;
 } vi_lane_group;
 
-/* Move all lanes on together, round after round, until one of them has an event or some hundred rounds are over. */
+/* Move all lanes on together, round after round, until a lane has an event or some hundred rounds have passed. */
 typedef void (*vi_lanes_rounds)(vi_lane_group *group, int modes, int contacts);
 
 #endif

@@ -9,7 +9,7 @@
 #include "door/runs.h"
 #include "motion/majorant.h"
 
-/* Least and, its reciprocal, largest size of stiffnesses and decays: squares of rates and of cells stay in range. */
+/* Least stiffness and, its reciprocal, largest stiffness and decay: squares of rates and of cells stay in range. */
 static const double LEAST = 1e-60;
 
 /* ---- the present instant ---- */
@@ -57,7 +57,7 @@ static void tell_impact(const vi_lanes_work *w, int lane)
     append(w, lane, row);
 }
 
-/* A period begins: tell of the one that ends. */
+/* A period begins: write the row of the period that ends. */
 static void turn_period(const vi_lanes_work *w, int lane, double displacement, double velocity)
 {
     const vi_lane_group *g = w->group;
@@ -78,7 +78,7 @@ static void turn_period(const vi_lanes_work *w, int lane, double displacement, d
 
 /* ---- the goals of a run ---- */
 
-/* What it flies to next: the end of a recorded period, or of a part of the run. */
+/* Set the next goal of the flight: the end of a recorded period, or of a part of the run. */
 static void set_goal(const vi_lanes_work *w, int lane)
 {
     vi_lane_group *g = w->group;
@@ -104,7 +104,7 @@ static void leave(vi_lanes_work *w, int lane)
     w->run[lane].point = -1;
 }
 
-/* The run has ended. */
+/* End the run, with its results. */
 static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
 {
     vi_lanes_points *points = w->points;
@@ -130,7 +130,7 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
     w->run[lane].following = point + 1;
 }
 
-/* At an instant that is no contact's: begin to record, turn the period, end. */
+/* Act at an instant without contact: begin to record, turn the period, or end. */
 static void arrive(vi_lanes_work *w, int lane)
 {
     vi_lane_group *g = w->group;
@@ -142,7 +142,7 @@ static void arrive(vi_lanes_work *w, int lane)
     }
     if (!run->recording) {
         run->recording = true;
-        g->tells[lane] = w->plan->impacts ? 1.0 : 0.0;
+        g->reports[lane] = w->plan->impacts ? 1.0 : 0.0;
         g->follows[lane] = w->plan->periods && w->plan->extrema ? 1.0 : 0.0;
         run->highest = run->lowest = displacement;
         if (w->plan->periods && g->rest[lane] == 0.0) {
@@ -156,7 +156,7 @@ static void arrive(vi_lanes_work *w, int lane)
     }
 }
 
-/* An impact that is told: its row, and the limit. */
+/* Act on an impact: write its row, and end at the impact limit. */
 static void hit(vi_lanes_work *w, int lane)
 {
     vi_lane_group *g = w->group;
@@ -171,7 +171,7 @@ static void hit(vi_lanes_work *w, int lane)
 
 /* ---- the careful search ---- */
 
-/* The rebound, as in lockstep. Returns the event. */
+/* Rebound as in lockstep. Returns the event. */
 static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
 {
     vi_lane_group *g = w->group;
@@ -185,11 +185,11 @@ static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
     g->on[lane] = g->hit[lane] = c + 1.0;
     g->approach[lane] = met->approach;
     g->impacts[lane] += 1.0;
-    const bool tells = g->tells[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
-    return tells ? VI_EVENT_IMPACT : VI_EVENT_NONE;
+    const bool reports = g->reports[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
+    return reports ? VI_EVENT_IMPACT : VI_EVENT_NONE;
 }
 
-/* Search the cell that lockstep could not decide. Returns the event that it comes to. */
+/* Search the cell that lockstep could not decide. Returns the resulting event. */
 static int search(const vi_lanes_work *w, int lane)
 {
     vi_lane_group *g = w->group;
@@ -245,7 +245,7 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
 
 void vi_lane_idle(vi_lanes_work *w, int lane)
 {
-    double *all = (double *)w->group; /* arrays over the lanes, all of them */
+    double *all = (double *)w->group; /* all arrays over the lanes */
     for (size_t i = (size_t)lane; i < sizeof *w->group / sizeof *all; i += VI_LANES) {
         all[i] = 0.0;
     }
@@ -260,7 +260,7 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
     }
 }
 
-/* Its clock and the window of its recording; false where they are none. */
+/* Set the clock and the window of the recording; false where they are invalid. */
 static bool take_time(const vi_lanes_work *w, int lane, int64_t point)
 {
     const vi_lanes_points *p = w->points;
@@ -282,7 +282,7 @@ static bool take_time(const vi_lanes_work *w, int lane, int64_t point)
     return true;
 }
 
-/* Springs and dashpots that a lane can follow. */
+/* Can a lane follow these springs and dashpots? */
 static bool take_modes(const vi_lanes_work *w, int64_t point)
 {
     const vi_lanes_points *p = w->points;
@@ -296,7 +296,7 @@ static bool take_modes(const vi_lanes_work *w, int64_t point)
     return true;
 }
 
-/* Where a point starts: its own start, or where the last one before it on its branch that came to its end has ended. */
+/* Find the start state of a point: its own, or the final state of the last ended point of its branch. */
 static bool take_start(const vi_lanes_work *w, int64_t point, double q[], double p[])
 {
     const vi_lanes_points *points = w->points;
@@ -315,7 +315,7 @@ static bool take_start(const vi_lanes_work *w, int64_t point, double q[], double
     return good;
 }
 
-/* How its contacts are told of. */
+/* Set the units of speeds and impulses of the contacts. */
 static void take_units(const vi_lanes_work *w, int lane, int64_t point)
 {
     const vi_lanes_points *p = w->points;
@@ -331,7 +331,7 @@ static void take_units(const vi_lanes_work *w, int lane, int64_t point)
     }
 }
 
-/* Begin a point in a lane; one may be left, or end, at once. */
+/* Begin a point in a lane; the point may be left, or end, at once. */
 static void begin_point(vi_lanes_work *w, int lane, int64_t point)
 {
     vi_lane_group *g = w->group;
@@ -340,7 +340,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     run->point = point;
     run->recording = run->goal_is_period = run->period_open = false;
     w->points->rows_of[point] = 0;
-    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = g->tells[lane] = g->follows[lane] = 0.0;
+    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = g->reports[lane] = g->follows[lane] = 0.0;
     g->most_impacts[lane] = w->plan->impact_limit > 0 ? (double)w->plan->impact_limit : HUGE_VAL;
     if (!take_start(w, point, q, p) || !take_modes(w, point) || !take_time(w, lane, point)
         || !w->body->take(g, lane, w->plan, w->points, point, q, p)) {
@@ -368,7 +368,7 @@ static bool can_begin(const vi_lanes_points *p, int64_t point)
 bool vi_lane_take(vi_lanes_work *w, int lane)
 {
     const int64_t following = w->run[lane].following;
-    if (can_begin(w->points, following)) { /* of the branch that the lane is on */
+    if (can_begin(w->points, following)) { /* on the lane's own branch */
         begin_point(w, lane, following);
         return true;
     }

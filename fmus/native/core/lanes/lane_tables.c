@@ -1,12 +1,12 @@
 #include "lanes/lane_tables.h"
 
-/* The state (q, p, cosine, sine) after some cells, as rows over (q, p, cosine, sine, 1). */
+/* State (q, p, cosine, sine) after some cells, as rows over (q, p, cosine, sine, 1). */
 typedef struct {
     double q[VI_PARTS], p[VI_PARTS];
-    double cosine, sine; /* of the force's turn */
+    double cosine, sine; /* turn of the force */
 } step;
 
-/* Taylor terms of q, in the share of a cell, for one part of the state by the equation of motion. */
+/* Taylor terms of q over the share of the cell, for one part of the state, from the equation of motion. */
 static void expand(const vi_lane_mode *mode, double cell, int part, double term[VI_LANE_ORDER + 1])
 {
     const double square = cell * cell, turn = mode->angular_frequency * cell, turn_square = turn * turn;
@@ -26,7 +26,7 @@ static void expand(const vi_lane_mode *mode, double cell, int part, double term[
     }
 }
 
-/* Cosine and sine of the force's turn in a cell. */
+/* Cosine and sine of the force's turn over a cell. */
 static void turn_of(double angle, double *cosine, double *sine)
 {
     const double square = angle * angle;
@@ -39,7 +39,7 @@ static void turn_of(double angle, double *cosine, double *sine)
     *sine = angle + angle * s;
 }
 
-/* First `a`, then `b`. */
+/* The step `a`, then the step `b`. */
 static step joined(const step *a, const step *b)
 {
     step both;
@@ -76,7 +76,7 @@ void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, do
     for (int part = 0; part < VI_PARTS; ++part) {
         double term[VI_LANE_ORDER + 1], q = 0.0, slope = 0.0;
         expand(mode, cell, part, term);
-        for (int n = VI_LANE_ORDER; n >= 0; --n) { /* the smallest first */
+        for (int n = VI_LANE_ORDER; n >= 0; --n) { /* smallest terms first */
             q += term[n];
             slope += n * term[n];
             group->one.taylor[n][part][lane] = term[n];
@@ -86,7 +86,7 @@ void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, do
     }
     turn_of(mode->angular_frequency * cell, &after[1].cosine, &after[1].sine);
     for (int i = 2; i <= VI_CELLS; ++i) {
-        after[i] = joined(&after[i - i / 2], &after[i / 2]); /* the fewest roundings */
+        after[i] = joined(&after[i - i / 2], &after[i / 2]); /* fewest roundings */
     }
     for (int i = 0; i <= VI_CELLS; ++i) {
         store(group, lane, i, &after[i]);

@@ -9,7 +9,7 @@ typedef struct {
     double stiffness, decay, force, held, angular_frequency;
 } vi_lane_mode;
 
-/* Fill the tables of one lane for cells of this length, s, which must be short against every rate. */
+/* Fill the tables of one lane for cells of this length, s; the length must be short against every rate. */
 void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, double cell);
 
 #endif

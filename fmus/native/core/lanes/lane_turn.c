@@ -5,11 +5,11 @@
 #define VI_WIDTH 1
 #include "lanes/vector.h"
 
-/* ln 2 in two parts; a whole number below 2^20 times the first is exact. */
+/* ln 2 in two parts; the first times a whole number below 2^20 is exact. */
 static const double LN2_HIGH = 6.93147180369123816490e-01, LN2_LOW = 1.90821492927058770002e-10;
-/* exp(-x) is 0 above it. */
+/* Argument x above which exp(-x) is 0. */
 static const double VANISHES = 746.0;
-/* Terms of the Taylor series of exp on half of ln 2: the first left out is below 1e-19. */
+/* Terms of the Taylor series of exp on half of ln 2; the first omitted term is below 1e-19. */
 enum { TERMS = 15 };
 
 void vi_lane_turn(double angle, double *cosine, double *sine)

@@ -6,24 +6,24 @@
 #include "lanes/instructions.h"
 #include "lanes/lane_run.h"
 
-/* Rounds of attending the lanes between two looks at the clock. */
-enum { ROUNDS_UNHEARD = 64 };
-/* Rows that one attending of the lanes may write. */
+/* Rounds of attending the lanes between two readings of the clock. */
+enum { ROUNDS_BETWEEN_READINGS = 64 };
+/* Most rows written when all lanes are attended once. */
 enum { MOST_ROWS = 8 * VI_LANES };
 
-/* What is under way between two calls. */
+/* State that is kept between two calls. */
 typedef struct {
-    vi_lane_group group; /* first: aligned as vectors are */
+    vi_lane_group group; /* first member: aligned like vectors */
     vi_lane_run run[VI_LANES];
-    int64_t begun;
-} under_way;
+    int64_t started;
+} kept_state;
 
-enum { ALIGNMENT = 64 };
+enum { ALIGNMENT = 64 }; /* of the state, bytes */
 
-static under_way *aligned(void *memory)
+static kept_state *aligned(void *memory)
 {
     const uintptr_t place = ((uintptr_t)memory + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-    return (under_way *)place;
+    return (kept_state *)place;
 }
 
 static bool is_plan(const vi_lanes_plan *plan)
@@ -34,12 +34,12 @@ static bool is_plan(const vi_lanes_plan *plan)
 
 VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan)
 {
-    return is_plan(plan) ? sizeof(under_way) + ALIGNMENT : 0;
+    return is_plan(plan) ? sizeof(kept_state) + ALIGNMENT : 0;
 }
 
-VI_DOOR int vi_door_lanes_instructions(int wanted)
+VI_DOOR int vi_door_lanes_instructions(int set)
 {
-    return vi_lanes_instructions(wanted);
+    return vi_lanes_instructions(set);
 }
 
 static bool works(const vi_lanes_work *work)
@@ -51,7 +51,7 @@ static bool works(const vi_lanes_work *work)
     return found;
 }
 
-/* Lanes without a point take what can begin. */
+/* Begin points in the lanes without a point, as far as points can begin. */
 static void take_all(vi_lanes_work *work)
 {
     for (int lane = 0; lane < VI_LANES; ++lane) {
@@ -65,13 +65,13 @@ static void take_all(vi_lanes_work *work)
     }
 }
 
-static void begin(vi_lanes_work *work, under_way *memory)
+static void begin(vi_lanes_work *work, kept_state *memory)
 {
-    if (memory->begun) {
+    if (memory->started) {
         return;
     }
     memset(memory, 0, sizeof *memory);
-    memory->begun = 1;
+    memory->started = 1;
     for (int lane = 0; lane < VI_LANES; ++lane) {
         vi_lane_idle(work, lane);
     }
@@ -84,15 +84,15 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
     }
     const double call = vi_seconds_now();
     const vi_lanes_rounds rounds = vi_lanes_rounds_of(plan->instructions);
-    under_way *now = aligned(memory);
+    kept_state *now = aligned(memory);
     vi_lanes_work work = {plan, plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes, points, &now->group, now->run, 0};
     begin(&work, now);
-    for (int unheard = 0;; ++unheard) {
+    for (int rounds_done = 0;; ++rounds_done) {
         if (points->rows_room - points->rows_used < MOST_ROWS) {
             return VI_LANES_FULL;
         }
-        if (unheard == ROUNDS_UNHEARD) {
-            unheard = 0;
+        if (rounds_done == ROUNDS_BETWEEN_READINGS) {
+            rounds_done = 0;
             if (vi_seconds_since(call) >= points->most_seconds) {
                 return VI_LANES_LISTEN;
             }

@@ -8,16 +8,16 @@
 #include "motion/flow.h"
 #include "motion/majorant.h"
 
-/* A steady response this many times what the force does within one radian costs as many roundings: left. */
+/* Largest steady response, in units of the force's effect within one radian; a larger one costs as many roundings. */
 static const double LARGEST_STEADY = 1000.0;
-/* Ratio of the lengths of cells of two levels. */
+/* Ratio of the cell lengths of two levels. */
 static const double RATIO = 4.0;
-/* Where a point is not followed by its amplitude: the share of a mode's natural frequency that it turns with. */
+/* Least rate of an underdamped mode, relative to its natural frequency, for bounds by amplitude; below, by energy. */
 static const double LEAST_TURNING = 0.1;
 
-/* ---- where it is ---- */
+/* ---- the state ---- */
 
-/* A state of a lane: what its modes do without the force, and the force's phase. */
+/* A state of a lane: the unforced motion of its modes, and the phase of the force. */
 typedef struct {
     double q[VI_LANES_MODES], p[VI_LANES_MODES], cosine, sine;
 } place;
@@ -32,7 +32,7 @@ static place start_of(const vi_lane_group *g, int lane, int modes)
     return s;
 }
 
-/* One cell of a level on. */
+/* The state one cell of a level later. */
 static place next_of(const vi_lane_group *g, int lane, int modes, int level, const place *s)
 {
     const vi_many_modes *many = &g->many;
@@ -68,7 +68,7 @@ static double amplitude_of(const vi_lane_group *g, int lane, int j, double q, do
 
 /* ---- the motion over a shortest cell ---- */
 
-/* Terms of all modes. */
+/* Taylor terms of all modes. */
 typedef struct {
     vi_lane_cell mode[VI_LANES_MODES];
 } motion;
@@ -135,7 +135,7 @@ static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts
         const double before = *share;
         const vi_cell_result one = vi_lane_cell_search(&cell, scale, share, &slope);
         if (one == VI_CELL_UNDECIDED || (one == VI_CELL_HIT && result == VI_CELL_HIT && *share == before)) {
-            return VI_CELL_UNDECIDED; /* two at one instant */
+            return VI_CELL_UNDECIDED; /* two contacts at one instant */
         }
         if (one == VI_CELL_HIT) {
             *met = (vi_lane_meeting){c, slope * g->cell_rate[lane]};
@@ -170,7 +170,7 @@ static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting
 
 /* ---- extremes ---- */
 
-/* How far the observed point may be from a line over a cell of a level, and its velocity from one. */
+/* Largest deviations of the observed point and of its velocity from a line over a cell of a level. */
 typedef struct {
     double place, velocity;
 } bulges;
@@ -197,7 +197,7 @@ static double crest(const vi_lane_group *g, int lane, int modes, double sign, do
     return vi_max(sign * end, vi_lane_cell_crest(&cell, sign, share));
 }
 
-/* The same over whole cells of a level; a cell with a crest that may be the largest is taken apart. */
+/* Largest sign * displacement over whole cells of a level; a cell whose crest may be the largest is divided. */
 static double extend(const vi_lane_group *g, int lane, int modes, double sign, int level, int cells, place s,
                      double most)
 {
@@ -227,7 +227,7 @@ static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, 
     place s = start_of(g, lane, modes);
     *highest = extend(g, lane, modes, 1.0, level, cells, s, *highest);
     *lowest = -extend(g, lane, modes, -1.0, level, cells, s, -*lowest);
-    if (g->share[lane] > 0.0) { /* only after a careful search, which begins where the lane was */
+    if (g->share[lane] > 0.0) { /* only after a careful search, which begins at the lane's state */
         *highest = vi_max(*highest, crest(g, lane, modes, 1.0, g->share[lane], &s));
         *lowest = vi_min(*lowest, -crest(g, lane, modes, -1.0, g->share[lane], &s));
     }
@@ -264,7 +264,7 @@ static void state(const vi_lane_group *g, int lane, int modes, double q[], doubl
 
 /* ---- the start ---- */
 
-/* Bounds of a mode's motion per unit of its amplitude: of its second derivative and of its third. */
+/* Bounds of a mode's second and third derivatives per unit of its amplitude. */
 typedef struct {
     double second, third;
 } bounds;
@@ -284,7 +284,7 @@ static bounds take_amplitude(vi_lane_group *g, int lane, int j, const vi_mode *m
     return (bounds){second, drag * second + mode->stiffness * natural};
 }
 
-/* What a mode, and its share of the force, is for the points. */
+/* Set a mode and its response to the force; false where lockstep cannot follow it. */
 static bool take_mode(vi_lane_group *g, int lane, int j, const vi_mode *mode, double held, double q, double p)
 {
     vi_many_modes *many = &g->many;
@@ -305,7 +305,7 @@ static bool take_mode(vi_lane_group *g, int lane, int j, const vi_mode *mode, do
     return isfinite(g->q[j][lane]) && isfinite(g->p[j][lane]);
 }
 
-/* Lengths of the cells: the longest is a part of a period, the shortest short against every rate. */
+/* Set the lengths of the cells: the longest is a part of a period, the shortest short against every rate. */
 static bool take_levels(vi_lane_group *g, int lane, double fastest)
 {
     vi_many_modes *many = &g->many;
@@ -330,7 +330,7 @@ static bool take_levels(vi_lane_group *g, int lane, double fastest)
     return true;
 }
 
-/* A point of the body: towards its stop, from there, as displacements grow in this direction. */
+/* Set a point of the body: its displacement from its stop, positive towards the stop. */
 static void take_point(vi_lane_group *g, int lane, int point, int modes, double direction, double position,
                        const double shape[])
 {
@@ -346,13 +346,13 @@ static void take_point(vi_lane_group *g, int lane, int point, int modes, double 
     }
 }
 
-/* Size of a point's steady response. */
+/* Size of the steady response of a point. */
 static double steady_size(const vi_lane_group *g, int lane, int point)
 {
     return fabs(g->many.cosine[point][lane]) + fabs(g->many.sine[point][lane]);
 }
 
-/* How far a point may be from a line, over the cells of all levels. */
+/* Set the largest deviations of a point from a line over cells of all levels. */
 static void take_bulges(vi_lane_group *g, int lane, int point, int modes, const bounds bound[])
 {
     vi_many_modes *many = &g->many;
@@ -367,7 +367,7 @@ static void take_bulges(vi_lane_group *g, int lane, int point, int modes, const 
     }
 }
 
-/* The same of the observed velocity. */
+/* Set the same deviations of the observed velocity. */
 static void take_tilts(vi_lane_group *g, int lane, int modes, const bounds bound[])
 {
     vi_many_modes *many = &g->many;
@@ -384,7 +384,7 @@ static void take_tilts(vi_lane_group *g, int lane, int modes, const bounds bound
     }
 }
 
-/* Bounds of how a contact that is left may come back within a shortest cell. */
+/* Set bounds on the return of a contact just left within a shortest cell. */
 static void take_leaving(vi_lane_group *g, int lane, int c, int modes, const bounds bound[])
 {
     vi_many_modes *many = &g->many;
@@ -395,7 +395,7 @@ static void take_leaving(vi_lane_group *g, int lane, int c, int modes, const bou
     many->leaving[c][VI_LANES_MODES][lane] = steady_size(g, lane, c) * w * w * w * cube;
 }
 
-/* A contact of a point; false where it is none, or the start is not free of it. */
+/* Set a contact of a point; false where it is invalid, or the start is not clear of it. */
 static bool take_contact(vi_lane_group *g, int lane, int c, int modes, const vi_lanes_points *points, int64_t point,
                          const double q[])
 {
@@ -425,7 +425,7 @@ static bool take_contact(vi_lane_group *g, int lane, int c, int modes, const vi_
     return isfinite(g->many.size[c][lane]);
 }
 
-/* Displacement and velocity of an unforced mode after some time, see `vi_mode_propagator`. */
+/* Propagator of an unforced mode, as `vi_mode_propagator`. */
 static void propagate(const vi_mode *mode, double u, double phi[4])
 {
     vi_mode_functions f = {0};

@@ -8,12 +8,12 @@
 #include "lanes/lane_turn.h"
 #include "motion/majorant.h"
 
-/* The steady response counts in the resolution up to this multiple of what the force does within one radian. */
+/* Largest steady response that counts in the resolution, in units of the force's effect within one radian. */
 static const double LARGEST_STEADY = 8.0;
 
-/* ---- where it is ---- */
+/* ---- the state ---- */
 
-/* A row of a table for the state at the start of the last round. */
+/* Value of a table's row for the state at the start of the last round. */
 static double after_cells(const vi_lane_array row[VI_PARTS], const vi_lane_group *g, int lane)
 {
     return (row[VI_OF_Q][lane] * g->start_q[0][lane] + row[VI_OF_P][lane] * g->start_p[0][lane])
@@ -90,7 +90,7 @@ static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting
 
 /* ---- extremes ---- */
 
-/* How far q may be from a line over one of the cells to come, and p from one: as the rounds bound them. */
+/* Largest deviations of q and p from a line over a cell ahead, as in the rounds. */
 typedef struct {
     double q, p;
 } bulges;
@@ -106,7 +106,7 @@ static bulges bulges_of(const vi_lane_group *g, int lane)
     return (bulges){second * eighth, third * eighth};
 }
 
-/* Does q rise, or fall, all through the cell after `passed`? */
+/* Does q rise, or fall, throughout the cell after `passed`? */
 static bool is_monotone(const vi_lane_group *g, int lane, int passed, double bulge)
 {
     const double first = after_cells(g->one.end_p[passed], g, lane);
@@ -114,7 +114,7 @@ static bool is_monotone(const vi_lane_group *g, int lane, int passed, double bul
     return vi_min(first, last) > bulge || vi_max(first, last) < -bulge;
 }
 
-/* How far the stops let q go on this side. */
+/* Limit of sign * q by the stops on this side. */
 static double stop_on(const vi_lane_group *g, int lane, int contacts, double sign)
 {
     double farthest = HUGE_VAL;
@@ -126,7 +126,7 @@ static double stop_on(const vi_lane_group *g, int lane, int contacts, double sig
     return farthest;
 }
 
-/* The largest sign * q, so far `most`, over the round whose cells end at edge[]. */
+/* The largest sign * q over the round whose cells end at edge[], and so far (`most`). */
 static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[],
                      const bulges *bulge, double most)
 {
@@ -189,7 +189,7 @@ static void state(const vi_lane_group *g, int lane, int modes, double q[], doubl
 
 /* ---- the start ---- */
 
-/* The contacts of a point; false where one is none, or the start is not free of it. */
+/* Set the contacts of a point; false where one is invalid, the start is not clear of it, or the stops leave no room. */
 static bool take_contacts(vi_lane_group *g, int lane, int contacts, const vi_lanes_points *p, int64_t point, double size)
 {
     double room = 0.0;

@@ -2,38 +2,38 @@
 #include "lanes/lane_group.h"
 #include "lanes/vector.h"
 
-/* Rounds after which the caller is heard again. */
+/* Rounds after which the lanes return to the caller. */
 enum { MOST_ROUNDS = 256 };
-/* Times that a lane may come through all its cells in one round. */
+/* Most times that a lane goes through all its cells in one round. */
 enum { MOST_JUMPS = 3 };
 
-/* Rounding of a displacement, in units of the terms it is the sum of. */
+/* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
 
-/* Where the lanes of a vector are at the start of a round. */
+/* State of the lanes of a vector at the start of a round. */
 typedef struct {
     vector q, p, cosine, sine, on;
     vector to_goal;             /* cells */
-    vector jumped;              /* whole cells that the round has led through before */
-    vector second, third, fourth; /* bounds of derivatives of q until VI_CELLS cells later, over a cell's powers */
+    vector jumped;              /* whole cells already passed in the round */
+    vector second, third, fourth; /* bounds of derivatives of q over VI_CELLS cells, times powers of the cell */
 } setting;
 
-/* The cell in which a lane may meet something. */
+/* The cell in which a lane may meet a contact or its goal. */
 typedef struct {
     vector passed;        /* whole cells before it */
     vector length;        /* share of it up to the goal or its end */
     mask goal;            /* its end is the goal */
     mask searched;        /* a contact may be met in it */
-    mask twofold;         /* two may */
+    mask twofold;         /* two contacts may be met in it */
     vector sign, limit;   /* of the contact */
     vector number;        /* from 1 */
     vector q, p, cosine, sine; /* at its start */
 } candidate;
 
-/* Bounds of the derivatives of q until VI_CELLS cells later. */
+/* Bound the derivatives of q over the next VI_CELLS cells. */
 LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
 {
-    /* the energy norm grows by no more than the loads do; the derivatives follow from the equation */
+    /* the energy norm grows at most by the loads; the derivatives follow from the equation */
     const vector k = load(g->one.stiffness + at), loads = load(g->one.load + at), drag = load(g->one.drag + at);
     const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
     const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * load(g->one.span + at);
@@ -45,7 +45,7 @@ LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
     s->fourth = fourth * (square * square);
 }
 
-/* What is left up to the goal, s. */
+/* Time to the goal, s. */
 LANES_INLINE vector seconds_to_goal(const vi_lane_group *g, int at)
 {
     const vector whole = load(g->goal_periods + at) - load(g->periods + at);
@@ -67,7 +67,7 @@ LANES_INLINE setting begin_round(const vi_lane_group *g, int at)
     return s;
 }
 
-/* Count the cells that no contact is met in: each contact's, and of all. */
+/* Count the cells in which each contact is surely not met. */
 LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setting *s, vector count[])
 {
     vector before[VI_LANES_CONTACTS], sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS];
@@ -90,7 +90,7 @@ LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setti
             const vector y = sign[c] * q - limit[c];
             mask passes = larger(before[c], y) + bulge < 0.0;
             if (i == 1) {
-                /* just left: the mean velocity since, which is smooth, stays negative */
+                /* just left: the mean velocity since then, which is smooth, stays negative */
                 const vector leaving = sign[c] * (s->p * load(g->cell + at));
                 const mask left = larger(leaving, y) + s->third * (1.0 / 24.0) < 0.0;
                 const mask here = s->on == (double)(c + 1);
@@ -103,7 +103,7 @@ LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setti
     }
 }
 
-/* Rows of a table, each lane's own. */
+/* Rows of a table, chosen by each lane. */
 LANES_INLINE vector gather(const vi_lane_array *rows, int stride, int at, const int row[])
 {
     vector found;
@@ -135,7 +135,7 @@ LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, c
     cell->sine = s->sine * c + s->cosine * n;
 }
 
-/* Whole cells that a lane surely comes through: no contact in them, and not beyond the goal. */
+/* Whole cells that a lane surely passes: no contact in them, and not beyond the goal. */
 LANES_INLINE vector sure_cells(const setting *s, int contacts, const vector count[], vector *cleared)
 {
     *cleared = all((double)VI_CELLS);
@@ -145,7 +145,7 @@ LANES_INLINE vector sure_cells(const setting *s, int contacts, const vector coun
     return smaller(*cleared, whole_part(smaller(s->to_goal, all((double)VI_CELLS))));
 }
 
-/* Lanes that come through all their cells go on from there in the same round. */
+/* Lanes that pass all their cells go on from there in the same round. */
 LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, setting *s)
 {
     const vi_lane_array *q = g->one.end_q[VI_CELLS], *p = g->one.end_p[VI_CELLS];
@@ -213,8 +213,8 @@ LANES_INLINE void expand(const vi_lane_group *g, int at, const candidate *cell, 
     }
 }
 
-/* What the polynomial adds to its first term, and its slope, after a share of the cell. Odd and even powers are summed apart:
- * half as many operations wait for one another. */
+/* Added value of the polynomial beyond its first term, and its slope, at a share of the cell. Odd and even powers are
+ * summed apart, which halves the chain of operations. */
 LANES_INLINE void follow(const vector term[], vector share, vector *added, vector *slope)
 {
     const vector square = share * share;
@@ -231,7 +231,7 @@ LANES_INLINE void follow(const vector term[], vector share, vector *added, vecto
     *slope = odd_slope + share * even_slope;
 }
 
-/* One step towards the zero of y + sign * (what the polynomial adds), of third order (Chebyshev's). */
+/* One step towards the zero of y + sign * (added value of the polynomial), of third order (Chebyshev's). */
 LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
 {
     const int last = VI_LANE_ORDER;
@@ -249,19 +249,19 @@ LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector sh
     return share - step * (1.0 + step * (bend * inverse));
 }
 
-/* Where a rising cubic's inverse has its zero: the first guess of the contact. */
+/* First guess of the contact: the zero of the inverse of a rising cubic. */
 LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end_slope, vector length)
 {
     const vector rise = end_y - y, t = -y / rise, back = 1.0 - t;
-    /* slopes of the inverse at both ends, of which the line has 1 */
+    /* slopes of the inverse at both ends; a line has 1 */
     const vector inverse = rise / (length * (slope * end_slope));
     const vector x = t + t * back * ((inverse * end_slope - 1.0) * back - (inverse * slope - 1.0) * t);
     return length * smaller(larger(x, all(0.0)), all(1.0));
 }
 
-/* What has become of the lanes in a round. */
+/* Result of a round for the lanes. */
 typedef struct {
-    vector share; /* of the cell that they have come through */
+    vector share; /* passed share of the cell */
     vector q, p;
     mask hits, careful;
 } arrival;
@@ -277,7 +277,7 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, co
     const vector end_y = y + cell->sign * added, end_slope = cell->sign * slope;
     const vector noise = ROUNDING * (size_of(cell->limit) + size_of(cell->q) + size_of(term[1]) + size_of(added));
     const mask rises = (smaller(first, end_slope) > 0.125 * s->third * (length * length)) & (y <= noise);
-    /* Bernstein's coefficients of the cubic with these values and slopes, and what is not cubic */
+    /* Bernstein coefficients of the cubic with these values and slopes, and the deviation from the cubic */
     const vector third = length * (1.0 / 3.0);
     const vector highest = larger(larger(y, end_y), larger(y + third * first, end_y - third * end_slope));
     const mask below = highest + s->fourth * (1.0 / 384.0) < 0.0;
@@ -301,7 +301,7 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, co
     return a;
 }
 
-/* Rebound where contacts are hit; returns the lanes that leave lockstep. */
+/* Rebound at the hit contacts; returns the lanes that leave lockstep. */
 LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *cell, arrival *a)
 {
     const vector approach = cell->sign * a->p;
@@ -326,7 +326,7 @@ LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidat
     return leaves;
 }
 
-/* Move the clocks by whole cells, which are exact, and a part of one; those at the goal are there exactly. */
+/* Move the clocks by whole cells, which are exact, and a part of a cell; clocks at the goal are set to it exactly. */
 LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector share, mask arrives)
 {
     const vector length = load(g->cell + at), period = load(g->period + at);
@@ -345,7 +345,7 @@ LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector shar
     store(g->periods + at, choose(arrives, load(g->goal_periods + at), load(g->periods + at) + turns));
 }
 
-/* One round of a vector of lanes; true when one of them has an event. */
+/* Do one round of a vector of lanes; true when one of them has an event. */
 LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
 {
     setting s = begin_round(g, at);
@@ -354,7 +354,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
     const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
     const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
-    const mask tells = (load(g->tells + at) > 0.0) | (impacts >= load(g->most_impacts + at));
+    const mask reports = (load(g->reports + at) > 0.0) | (impacts >= load(g->most_impacts + at));
     store(g->start_q[0] + at, s.q);
     store(g->start_p[0] + at, s.p);
     store(g->start_cosine + at, s.cosine);
@@ -367,7 +367,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
     vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(a.hits & tells, all((double)VI_EVENT_IMPACT), event);
+    event = choose(a.hits & reports, all((double)VI_EVENT_IMPACT), event);
     event = choose(arrives, all((double)VI_EVENT_GOAL), event);
     event = choose(a.careful, all((double)VI_EVENT_CELL), event);
     event = choose(leaves, all((double)VI_EVENT_LEAVE), event);

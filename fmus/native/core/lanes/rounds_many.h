@@ -1,8 +1,8 @@
-/* The lockstep of bodies of several modes: certified cells of ever shorter length up to a contact, which is then for the
- * careful search. Included by one C file for each instruction set, which names VI_ROUNDS, the lockstep of either kind. */
+/* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the careful search
+ * finds. Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
 #include "lanes/rounds.h"
 
-/* The rows of tables for the length of cells that each lane has now. */
+/* Rows of the tables for the present cell lengths of the lanes. */
 typedef struct {
     vector step[VI_LANES_MODES][4], bulge[VI_LANES_CONTACTS];
     vector turn_cosine, turn_sine, cells, rate;
@@ -36,7 +36,7 @@ LANES_INLINE level_rows rows_of(const vi_lane_group *g, int at, int modes, int c
     return rows;
 }
 
-/* Displacement of a point, towards its stop from there. */
+/* Displacement of a point from its stop, positive towards the stop. */
 LANES_INLINE vector point_at(const vi_lane_group *g, int at, int modes, int point, const vector q[], vector cosine,
                              vector sine)
 {
@@ -49,7 +49,7 @@ LANES_INLINE vector point_at(const vi_lane_group *g, int at, int modes, int poin
     return y;
 }
 
-/* Has a contact that is just left come away over a shortest cell? Its mean velocity since stays negative. */
+/* Has a contact just left come away over a shortest cell? Its mean velocity since then stays negative. */
 LANES_INLINE mask comes_away(const vi_lane_group *g, int at, int modes, int c, const vector p[], const vector amplitude[],
                              vector cosine, vector sine, vector y)
 {
@@ -64,7 +64,7 @@ LANES_INLINE mask comes_away(const vi_lane_group *g, int at, int modes, int c, c
     return (larger(speed * load(g->cell + at), y) + bound < 0.0) & (load(many->level + at) == load(many->last + at));
 }
 
-/* The state after each cell, and how many of them no contact is met in. */
+/* The state after each cell, and the number of cells in which no contact is met. */
 typedef struct {
     vector q[VI_CELLS + 1][VI_LANES_MODES], p[VI_CELLS + 1][VI_LANES_MODES];
     vector count;
@@ -167,7 +167,7 @@ void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
     if (modes > 1) {
         run_rounds_many(g, modes, contacts);
     } else if (contacts < 2) {
-        run_rounds(g, 1); /* without a contact its place is that of an idle lane: nothing meets it */
+        run_rounds(g, 1); /* without a contact the tables are those of an idle lane: nothing meets it */
     } else {
         run_rounds(g, 2);
     }

@@ -1,7 +1,7 @@
-/* Vectors of VI_WIDTH numbers and what the lanes do with them: elementwise, so that a lane's bits do not depend on it.
+/* Vectors of VI_WIDTH numbers and their elementwise operations. A lane's bits do not depend on the width.
  *
- * Included by the files that define VI_WIDTH, one for each instruction set. GNU vector extensions: gcc, clang and zig have
- * them on every machine.
+ * Included by the files that define VI_WIDTH, one for each instruction set. GNU vector extensions: gcc, clang and zig
+ * have them on every machine.
  */
 #ifndef VIBROIMPACT_LANE_VECTOR_H
 #define VIBROIMPACT_LANE_VECTOR_H
@@ -13,7 +13,7 @@
 typedef double vector __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 typedef int64_t mask __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 
-/* All of a round is one function; not under a sanitizer, whose checks in so large a one take minutes to compile. */
+/* All functions of a round are inlined into one, except under a sanitizer: its checks take minutes to compile. */
 #if defined(__SANITIZE_ADDRESS__)
 #define LANES_INLINE static inline
 #else
@@ -40,7 +40,7 @@ LANES_INLINE vector choose(mask where, vector a, vector b)
     return (vector)(((mask)a & where) | ((mask)b & ~where));
 }
 
-/* `a` where the mask is, else 0. */
+/* `a` where the mask is set, otherwise 0. */
 LANES_INLINE vector only(mask where, vector a)
 {
     return (vector)((mask)a & where);
@@ -88,7 +88,7 @@ LANES_INLINE vector error_of_sum(vector a, vector b, vector sum)
     return (a - (sum - part)) + (b - part);
 }
 
-/* Added to a number below 2^51 it leaves the nearest whole one in the low bits. */
+/* Adding this to a number below 2^51 leaves the nearest whole number in the low bits. */
 #define WHOLE 6755399441055744.0
 
 /* Largest whole number <= a, for 0 <= a < 2^51. */
@@ -98,7 +98,7 @@ LANES_INLINE vector whole_part(vector a)
     return near - only(near > a, all(1.0));
 }
 
-/* Cosine and sine of 0 <= angle <= 8, to 1 ulp (the polynomials are those of fdlibm). */
+/* Cosine and sine of 0 <= angle <= 8, to 1 ulp (the polynomials are fdlibm's). */
 LANES_INLINE void turn(vector angle, vector *cosine, vector *sine)
 {
     const vector shifted = angle * 0.63661977236758134308 + WHOLE;

@@ -4,10 +4,10 @@
 #include <string.h>
 
 static const double PI = 3.14159265358979323846;
-/* Below this many radians of its fastest rate a stretch is followed by its series: a jump of the force over 1e-12 s would lose all
- * digits beside the slope that it makes. */
+/* Length of a stretch, in radians of its fastest rate, below which it is followed by its series. A jump of the force
+ * over 1e-12 s would otherwise lose all digits beside its slope. */
 static const double SHORT_STRETCH = 0.7;
-/* What rings with less than this, N, is at rest: the processor is slow with numbers near the smallest. */
+/* Ringing, N, below which the cell counts as at rest: processors are slow with numbers near the smallest. */
 static const double NO_RING = 1e-200;
 
 void vi_cell_start(vi_cell *cell, double time, double force)
@@ -54,7 +54,7 @@ bool vi_cell_hit(vi_cell *cell, double impulse)
     return true;
 }
 
-/* The half sine that was begun first is over: its second sine begins. */
+/* End the half sine that began first: its second sine begins. */
 static void end_pulse(vi_cell *cell)
 {
     cell->sine += cell->pulses[cell->first].peak;
@@ -62,11 +62,11 @@ static void end_pulse(vi_cell *cell)
     cell->count -= 1;
     if (cell->count == 0) {
         cell->first = 0;
-        cell->sine = cell->cosine = 0.0; /* rounding is left of what has cancelled */
+        cell->sine = cell->cosine = 0.0; /* cancelled sines leave rounding */
     }
 }
 
-/* The cell under the load of half sines alone, or free; its state counts from the level of the straight force. */
+/* Move the cell under half sines alone, or free; its state counts from the level of the straight force. */
 static void ring(const vi_cell *cell, double span, double *x, double *v)
 {
     vi_mode mode = cell->mode;
@@ -76,7 +76,7 @@ static void ring(const vi_cell *cell, double span, double *x, double *v)
         vi_mode_start(&mode, 1.0, 2.0 * mode.decay, mode.stiffness, mode.stiffness * peak, cell->turn);
         angle = atan2(-cell->sine, cell->cosine);
     }
-    while (span > 0.0) { /* once, but near resonance: there in parts of .7 rad, of half a turn at most */
+    while (span > 0.0) { /* once, except near resonance: there in parts of .7 rad, at most half a turn */
         vi_segment segment;
         vi_motion motion;
         vi_segment_start(&segment, &mode, *x, *v, vi_phase_of(angle), 0.0, 0.0, span, false);
@@ -88,7 +88,7 @@ static void ring(const vi_cell *cell, double span, double *x, double *v)
     }
 }
 
-/* One series for all that is on the cell. */
+/* Move the cell by one series for the force and the half sines together. */
 static void ring_shortly(const vi_cell *cell, double span, double slope, double *x, double *v)
 {
     vi_mode mode = cell->mode;
@@ -121,7 +121,7 @@ static void follow(vi_cell *cell, double span, double slope)
     cell->seen_rate = slope + v;
 }
 
-/* No half sine ends before `time`. */
+/* Pass to `time`; no half sine ends before. */
 static void pass(vi_cell *cell, double time, double slope)
 {
     const double span = time - cell->time;

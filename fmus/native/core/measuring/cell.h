@@ -1,12 +1,13 @@
-/* A load cell: what it makes of the force on it, exact for a force that goes straight and for the half sines of impacts.
+/* A load cell: its output for a given force, exact for a force that changes linearly and for the half sines of impacts.
  *
  *     y'' + 2 damping_ratio w y' + w^2 y = w^2 (force + half sines),    volts = sensitivity y + offset + drift time
  *
- * with w = 2 pi natural_frequency; natural_frequency 0: y is the force itself. An impact on a rigid stop is a half sine of
- * `contact_duration` that begins with it and has its impulse: its peak is impulse pi / (2 contact_duration).
+ * with w = 2 pi natural_frequency; for natural_frequency 0, y is the force itself. An impact on a rigid stop is a half
+ * sine over `contact_duration` from the instant of impact, with the impulse of the impact. Its peak is impulse pi / (2
+ * contact_duration).
  *
- * A half sine is two endless sines, the second begun when the first has made half a turn: they cancel. So all half sines that
- * are under way are one sine of two amplitudes, and each costs the cell two instants, however many overlap.
+ * A half sine is two endless sines, the second one beginning half a turn after the first: they cancel. So all present
+ * half sines are one sine with two amplitudes. Each costs the cell two instants, however many overlap.
  */
 #ifndef VIBROIMPACT_CELL_H
 #define VIBROIMPACT_CELL_H
@@ -17,20 +18,21 @@
 
 #include "motion/flow.h"
 
-/* Half sines that may be under way at once. */
+/* Largest number of half sines at once. */
 enum { VI_CELL_PULSES = 2048 };
-/* Largest natural frequency (Hz), damping ratio and contact duration (s): no half sine then takes more than some thousand series. */
+/* Largest natural frequency (Hz), damping ratio and contact duration (s); a half sine then needs some thousand
+ * series at most. */
 enum { VI_CELL_HIGHEST = 10000000, VI_CELL_STRONGEST = 1000, VI_CELL_LONGEST = 1000 };
-/* Least natural frequency and contact duration but 0: their squares are numbers. */
+/* Least natural frequency and contact duration, apart from 0: their squares do not underflow. */
 #define VI_CELL_LEAST 1e-9
 
 typedef struct {
     double sensitivity;       /* V/N */
-    double natural_frequency; /* Hz, 0 or VI_CELL_LEAST to VI_CELL_HIGHEST; 0: none */
+    double natural_frequency; /* Hz, 0 or VI_CELL_LEAST to VI_CELL_HIGHEST; 0: the cell does not ring */
     double damping_ratio;     /* 0 to VI_CELL_STRONGEST */
     double offset;            /* V */
     double drift;             /* V/s */
-    double contact_duration;  /* s, 0 or VI_CELL_LEAST to VI_CELL_LONGEST; 0: no impacts come */
+    double contact_duration;  /* s, 0 or VI_CELL_LEAST to VI_CELL_LONGEST; 0: no impacts */
 } vi_cell_settings;
 
 typedef struct {
@@ -39,30 +41,30 @@ typedef struct {
 
 typedef struct {
     vi_cell_settings settings;
-    vi_mode mode;          /* the cell, not forced */
+    vi_mode mode;          /* the cell without a force */
     double turn;           /* angular frequency of the half sines, rad/s */
     double time;           /* reached, s */
-    double force;          /* now, N, without half sines */
+    double force;          /* present force without half sines, N */
     double seen, seen_rate; /* y and y', N and N/s */
-    double sine, cosine;   /* half sines under way: sine sin(turn u) + cosine cos(turn u), u from now on */
-    int64_t first, count;  /* those under way: pulses[first] to pulses[first + count - 1], in the order of their ends */
-    vi_pulse pulses[VI_CELL_PULSES]; /* last: only the used part is saved with a state */
+    double sine, cosine;   /* present half sines: sine sin(turn u) + cosine cos(turn u), with u from now on */
+    int64_t first, count;  /* present ones: pulses[first] to pulses[first + count - 1], in the order of their ends */
+    vi_pulse pulses[VI_CELL_PULSES]; /* last member: only the used part is saved with a state */
 } vi_cell;
 
-/* Settled under a force at `time`. The settings are good. */
+/* Start the cell settled under a force at `time`. The settings must be valid. */
 void vi_cell_start(vi_cell *cell, double time, double force);
 
-/* Go on to `time` >= that reached, under a force that changes by `slope` N/s. */
+/* Advance to `time`, not before the present time, under a force that changes by `slope` N/s. */
 void vi_cell_advance(vi_cell *cell, double time, double slope);
 
-/* An impact of this impulse, N s, now; contact_duration is > 0. False when VI_CELL_PULSES are under way. */
+/* Add an impact of this impulse, N s, now; contact_duration must be > 0. False above VI_CELL_PULSES half sines. */
 bool vi_cell_hit(vi_cell *cell, double impulse);
 
-/* What is on the cell now, half sines too, N; and its output, V. */
+/* Present force on the cell with half sines, N; present output of the cell, V. */
 double vi_cell_load(const vi_cell *cell);
 double vi_cell_volts(const vi_cell *cell);
 
-/* Bytes at the end of the cell that hold no half sines. */
+/* Bytes of unused half sines at the end of the cell. */
 size_t vi_cell_unused(const vi_cell *cell);
 
 #endif

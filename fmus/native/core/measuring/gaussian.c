@@ -4,8 +4,8 @@
 
 #include "measuring/philox.h"
 
-/* Wichura, Algorithm AS 241: the percentage points of the normal distribution, Applied Statistics 37 (1988): rational
- * functions, right to 1e-16. Numerators and denominators from the highest power on. */
+/* Rational functions of Wichura's Algorithm AS 241: the percentage points of the normal distribution, Applied
+ * Statistics 37 (1988); right to 1e-16. Numerators and denominators from the highest power on. */
 enum { TERMS = 8 };
 static const double MIDDLE[2][TERMS] = {
     {2.5090809287301226727e+3, 3.3430575583588128105e+4, 6.7265770927008700853e+4, 4.5921953931549871457e+4,
@@ -36,7 +36,7 @@ static double ratio(const double terms[2][TERMS], double x)
     return above / below;
 }
 
-/* Natural logarithm of a normal number, by the series of artanh: that of a C library differs from machine to machine. */
+/* Natural logarithm of a normal number by the series of artanh, since C libraries differ between machines. */
 static double logarithm(double x)
 {
     int exponent;

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* Random bits that are a function of a counter and a key alone: put in place of the counter. */
+/* Random bits as a function of a counter and a key only; they replace the counter. */
 void vi_philox(uint32_t counter[4], uint32_t key0, uint32_t key1);
 
 #endif

@@ -1,6 +1,6 @@
 #include "measuring/reading.h"
 
-/* By comparisons: fmin would turn what is no number into the end of the range. */
+/* Comparisons keep NaN; fmin would turn it into the end of the range. */
 double vi_ended(double volts, double highest)
 {
     if (!(highest > 0.0)) {

@@ -8,9 +8,9 @@
 static const double PI = 3.14159265358979323846;
 static const double PI_LOW = 1.22464679914735317636e-16;
 static const double ROOT_2 = 1.41421356237309504880;
-enum { NEWTON_STEPS = 12 }; /* six are enough */
+enum { NEWTON_STEPS = 12 }; /* most steps; six are enough */
 
-/* xi = turns pi + delta; `turns` is a multiple of 1/4, so that turns * s can be reduced without rounding. */
+/* An eigenvalue xi = turns pi + delta; `turns` is a multiple of 1/4, so turns * s is reduced without rounding. */
 typedef struct {
     double turns, delta, xi;
 } eigenvalue;
@@ -34,7 +34,7 @@ static double turns_of(vi_beam_boundary boundary, int j)
     }
 }
 
-/* One step of Newton on the equation for delta of equations.md 6.2; cosh and sinh would overflow. */
+/* One Newton step on the equation for delta in equations.md 6.2, without cosh and sinh, which would overflow. */
 static double newton_step(vi_beam_boundary boundary, int j, double xi, double delta)
 {
     const double square = exp(-2.0 * xi);
@@ -64,8 +64,8 @@ double vi_beam_eigenvalue(vi_beam_boundary boundary, int j)
     return find_eigenvalue(boundary, j).xi;
 }
 
-/* sin and cos of pi turns s + delta s. The first product is reduced to within pi/4 exactly: turns * s = high + low,
- * and whole quarters leave no rounding. */
+/* sin and cos of pi turns s + delta s. The first product is reduced to within pi/4 exactly: turns * s = high + low, and
+ * whole quarters have no rounding. */
 static void sine_cosine(double turns, double delta, double s, double *sine, double *cosine)
 {
     const double high = turns * s, low = fma(turns, s, -high);
@@ -92,7 +92,7 @@ static void sine_cosine(double turns, double delta, double s, double *sine, doub
     }
 }
 
-/* Derivative of sin and -cos over their argument. */
+/* Differentiate sin and -cos over their argument. */
 static void differentiate(int derivative, double *sine, double *minus_cosine)
 {
     for (int d = 0; d < derivative; ++d) {
@@ -102,7 +102,7 @@ static void differentiate(int derivative, double *sine, double *minus_cosine)
     }
 }
 
-/* The factor B of equations.md 6.3: that of the wave that decays from the far end. */
+/* Factor B of equations.md 6.3, of the wave that decays from the far end. */
 static double far_wave(vi_beam_boundary boundary, int j, double xi)
 {
     const double e = exp(-xi), square = e * e;
@@ -118,7 +118,7 @@ static double far_wave(vi_beam_boundary boundary, int j, double xi)
     }
 }
 
-/* equations.md 6.3, sorted so that displacement and slope vanish exactly at the clamp. */
+/* Shape of equations.md 6.3, ordered so that displacement and slope vanish exactly at the clamp. */
 static double waves(vi_beam_boundary boundary, int j, double s, int derivative)
 {
     const eigenvalue e = find_eigenvalue(boundary, j);
@@ -165,7 +165,7 @@ double vi_beam_shape(vi_beam_boundary boundary, int j, double s, int derivative)
     }
     double sign = 1.0;
     if (boundary == VI_CLAMPED_CLAMPED) {
-        if (s > 0.5) { /* the ends are alike */
+        if (s > 0.5) { /* both ends are alike */
             s = 1.0 - s;
             sign = -alternating(j + derivative);
         }
@@ -177,7 +177,7 @@ double vi_beam_shape(vi_beam_boundary boundary, int j, double s, int derivative)
     return sign * power(vi_beam_eigenvalue(boundary, j), derivative) * waves(boundary, j, s, derivative);
 }
 
-/* equations.md 6.5: the difference of phi''' / xi^4 between the ends, with phi'''(0) = -2 sig xi^3. */
+/* equations.md 6.5: difference of phi''' / xi^4 between the ends, with phi'''(0) = -2 sig xi^3. */
 double vi_beam_participation(vi_beam_boundary boundary, int j)
 {
     if (boundary == VI_PINNED_PINNED) {
@@ -201,7 +201,7 @@ double vi_beam_validity(vi_beam_boundary boundary, int j, double slenderness, do
     return 0.5 * ratio * ratio * (1.0 + e_over_g / shear_coefficient);
 }
 
-/* Gauss with partial pivoting on the rows a[k][0..n], the right-hand side last; false when singular to rounding. */
+/* Gaussian elimination with partial pivoting on rows a[k][0..n], right-hand side last; 0: singular to rounding. */
 static int solve(int n, double a[][VI_MODES + 1], double x[])
 {
     for (int step = 0; step < n; ++step) {
@@ -214,7 +214,7 @@ static int solve(int n, double a[][VI_MODES + 1], double x[])
             a[step][j] = a[best][j];
             a[best][j] = kept;
         }
-        if (!(fabs(a[step][step]) > 8.0 * n * DBL_EPSILON)) { /* shapes are of the order of 1 */
+        if (!(fabs(a[step][step]) > 8.0 * n * DBL_EPSILON)) { /* shapes are of order 1 */
             return 0;
         }
         for (int i = step + 1; i < n; ++i) {

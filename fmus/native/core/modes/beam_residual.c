@@ -4,7 +4,8 @@
 
 #include "modes/singular.h"
 
-/* Shares of B fall as xi^-8: of those from TAIL_FACTOR N + TAIL_LEAST on, less than 1e-6 of B is left. */
+/* Last mode in the sums for B: TAIL_FACTOR N + TAIL_LEAST. Terms of B fall as xi^-8, and the omitted terms are below
+ * 1e-6 of B. TOO_NEAR: least pivot of A, relative to its diagonal entry; below, two points count as the same. */
 enum { TAIL_FACTOR = 8, TAIL_LEAST = 56 };
 static const double TOO_NEAR = 1e-7;
 
@@ -28,7 +29,7 @@ double vi_beam_static_shape(vi_beam_boundary boundary, double s, double c)
     }
 }
 
-/* Displacement at s under a uniform load 1. */
+/* Displacement at s under a uniform load of 1. */
 static double evenly_loaded(vi_beam_boundary boundary, double s)
 {
     const double rest = 1.0 - s;
@@ -54,7 +55,7 @@ static double eigenvalue_4(vi_beam_boundary boundary, int j)
     return fourth_power(vi_beam_eigenvalue(boundary, j));
 }
 
-/* psi_k at s: what the static shape has beyond the modes that are kept. */
+/* psi_k at s: the static shape without the kept modes. */
 static double dropped_static(const vi_beam_residual *r, double s, int k)
 {
     double kept = 0.0;
@@ -65,7 +66,7 @@ static double dropped_static(const vi_beam_residual *r, double s, int k)
     return vi_beam_static_shape(r->boundary, s, r->point[k]) - kept;
 }
 
-/* B; the smallest shares first. */
+/* The matrix B, summed from the smallest terms. */
 static void dropped_mass(const vi_beam_residual *r, double b[VI_PORTS][VI_PORTS])
 {
     for (int n = TAIL_FACTOR * r->natural + TAIL_LEAST; n > r->natural; --n) {
@@ -83,7 +84,7 @@ static void dropped_mass(const vi_beam_residual *r, double b[VI_PORTS][VI_PORTS]
     }
 }
 
-/* A = L L'; the lower triangle becomes L. Returns 0, or the number of the row that the rows before it explain. */
+/* Factor A = L L' in place: the lower triangle becomes L. Returns 0, or the number of a dependent row. */
 static int factor(int n, double a[VI_PORTS][VI_PORTS])
 {
     for (int k = 0; k < n; ++k) {
@@ -116,7 +117,7 @@ static void reduce(int n, double lower[VI_PORTS][VI_PORTS], double b[VI_PORTS][V
             b[k][column] /= lower[k][k];
         }
     }
-    for (int row = 0; row < n; ++row) { /* and its rows by L^-T */
+    for (int row = 0; row < n; ++row) { /* its rows times L^-T */
         for (int k = 0; k < n; ++k) {
             reduced[row][k] = b[row][k];
             for (int i = 0; i < k; ++i) {
@@ -150,7 +151,7 @@ int vi_beam_residual_find(vi_beam_residual *residual, vi_beam_boundary boundary,
     if (!vi_singular_find(points, points, reduced, &singular) || singular.rank < points) {
         return points;
     }
-    for (int i = 0; i < points; ++i) { /* the largest value is the lowest frequency */
+    for (int i = 0; i < points; ++i) { /* the largest value belongs to the lowest frequency */
         const int from = points - 1 - i;
         residual->eigenvalue[i] = pow(singular.value[from], -0.25);
         for (int k = points - 1; k >= 0; --k) { /* L^-T y */
@@ -161,7 +162,7 @@ int vi_beam_residual_find(vi_beam_residual *residual, vi_beam_boundary boundary,
             residual->weight[i][k] = share / a[k][k];
         }
     }
-    for (int i = 0; i < points; ++i) { /* v'B v = 1 */
+    for (int i = 0; i < points; ++i) { /* normalise: v'B v = 1 */
         const double scale = residual->eigenvalue[i] * residual->eigenvalue[i];
         for (int k = 0; k < points; ++k) {
             residual->weight[i][k] *= scale;

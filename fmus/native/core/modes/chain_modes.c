@@ -8,15 +8,15 @@
 #include "modes/singular.h"
 
 static const double PI = 3.14159265358979323846;
-static const double TAKES_PART = 1e-8;
-/* Of C M^-1 K - K M^-1 C, beside the sum of the moduli of its terms, each of which has a few roundings. */
+static const double TAKES_PART = 1e-8; /* displacement times sqrt(mass) above which a mass sets a mode's sign */
+/* C M^-1 K - K M^-1 C, relative to its terms' moduli, up to which C and K commute; each term has a few roundings. */
 static const double COMMUTES = 32.0 * DBL_EPSILON;
-/* Left in the modal damping matrix beside its diagonal where C and K commute; within equal frequencies the modes are
- * not unique, and those found need not be those that the damping keeps apart. */
+/* Off-diagonal modal damping, relative to the diagonal, up to which modes count as uncoupled. If C and K commute, modes
+ * of equal frequencies are not unique: the modes found need not be those that the damping separates. */
 static const double DIAGONAL = 1e-9;
 
-/* Elongation of element e in mode j for q_j = 1, kg^(-1/2). Kept apart from the shapes: for a stiff spring between
- * masses that move far together the difference of the shapes has no digits left. */
+/* Elongation of element e in mode j for q_j = 1, kg^(-1/2). Across a stiff spring between masses that move far
+ * together, the difference of the shapes has no digits left, so elongations are kept apart. */
 typedef struct {
     double in[VI_MODES + 1][VI_MODES];
 } elongations;
@@ -45,7 +45,7 @@ static bool is_uniform(const vi_chain *chain)
     return same;
 }
 
-/* sin(pi number / (2 of)), the angle reduced without rounding. */
+/* sin(pi number / (2 of)), with the angle reduced without rounding. */
 static double sine_of_quarter(int number, int of)
 {
     number %= 4 * of;
@@ -55,7 +55,7 @@ static double sine_of_quarter(int number, int of)
     return sign * (2 * number > of ? cos(PI * (of - number) / (2.0 * of)) : sin(PI * number / (2.0 * of)));
 }
 
-/* equations.md 5.2 */
+/* Modes in closed form: equations.md 5.2. */
 static void find_uniform(const vi_chain *chain, vi_chain_modes *modes, elongations *elongation)
 {
     const int n = chain->masses, of = 2 * n + 1;
@@ -72,8 +72,8 @@ static void find_uniform(const vi_chain *chain, vi_chain_modes *modes, elongatio
     }
 }
 
-/* Each group of masses tied to each other but not to the ground moves as one; column j on gets these modes. Returns
- * how many there are. */
+/* Find the rigid-body modes: each group of masses tied to each other but not to the ground moves as one. They fill
+ * columns from 0 on. Returns their number. */
 static int find_rigid(const vi_chain *chain, vi_chain_modes *modes)
 {
     const int n = chain->masses;
@@ -94,7 +94,7 @@ static int find_rigid(const vi_chain *chain, vi_chain_modes *modes)
     return found;
 }
 
-/* One end of an element sees its displacement from the other end: take that where its error is the smaller one. */
+/* Take the displacement at the other end of an element plus the elongation, if this has a smaller error. */
 static void improve(double *here, double *error, double there, double there_error, double elongation, double blur)
 {
     if (there_error + blur < *error) {
@@ -103,12 +103,12 @@ static void improve(double *here, double *error, double there, double there_erro
     }
 }
 
-/* Displacements in mode j. As a component of a unit vector times 1 / sqrt(mass), that of a small mass among large
- * ones has few digits; in modes slower than the mass on its own springs it is better seen from its neighbours. */
+/* Find the displacements of the masses in mode j. A small mass among large ones has few digits as a component of a unit
+ * vector times 1 / sqrt(mass). In modes slower than this mass on its own springs, its neighbours give more digits. */
 static void place_masses(const vi_chain *chain, int j, vi_chain_modes *modes, const elongations *elongation)
 {
     const int n = chain->masses;
-    double error[VI_MODES + 2], at[VI_MODES + 2]; /* the ground, the masses, the ground */
+    double error[VI_MODES + 2], at[VI_MODES + 2]; /* of the ground, the masses, the ground */
     double blur[VI_MODES + 1];
     at[0] = at[n + 1] = error[0] = error[n + 1] = 0.0;
     for (int i = 0; i < n; ++i) {
@@ -129,7 +129,7 @@ static void place_masses(const vi_chain *chain, int j, vi_chain_modes *modes, co
     }
 }
 
-/* B, one row for each spring: its force, in units of sqrt(stiffness), for unit sqrt(mass) displacement. */
+/* Fill B, one row for each spring: its force, in units of sqrt(stiffness), for a displacement of 1 / sqrt(mass). */
 static void fill_factor(const vi_chain *chain, double factor[][VI_MODES])
 {
     const int n = chain->masses;
@@ -169,7 +169,7 @@ static bool find_general(const vi_chain *chain, vi_chain_modes *modes, elongatio
     return true;
 }
 
-/* Between masses without a spring nothing but the difference of their shapes tells. */
+/* Find elongations between masses without a spring, from the differences of their shapes. */
 static void elongate_gaps(const vi_chain *chain, const vi_chain_modes *modes, elongations *elongation)
 {
     const int n = chain->masses;
@@ -198,7 +198,7 @@ static void orient(const vi_chain *chain, vi_chain_modes *modes, elongations *el
     }
 }
 
-/* Psi' C Psi, summed over the dampers. */
+/* Modal damping matrix Psi' C Psi, summed over the dampers. */
 static void project_damping(const vi_chain *chain, vi_chain_modes *modes, const elongations *elongation)
 {
     const int n = chain->masses;
@@ -215,13 +215,13 @@ static void project_damping(const vi_chain *chain, vi_chain_modes *modes, const 
     }
 }
 
-/* Entry (i, j) of the chain's matrix made of element values; j is i - 1, i or i + 1. */
+/* Entry (i, j) of the chain's matrix of element values; j is i - 1, i or i + 1. */
 static double entry(const double element[], int i, int j)
 {
     return i == j ? element[i] + element[i + 1] : -element[i > j ? i : j];
 }
 
-/* Is entry (i, j) of C M^-1 K - K M^-1 C nothing but rounding? */
+/* Is entry (i, j) of C M^-1 K - K M^-1 C mere rounding? */
 static bool commutes_at(const vi_chain *chain, int i, int j)
 {
     double difference = 0.0, size = 0.0;
@@ -239,7 +239,7 @@ static bool commutes_at(const vi_chain *chain, int i, int j)
 static bool commutes(const vi_chain *chain)
 {
     for (int i = 0; i < chain->masses; ++i) {
-        for (int j = i + 1; j < chain->masses && j <= i + 2; ++j) { /* further apart, and for i = j, it is 0 */
+        for (int j = i + 1; j < chain->masses && j <= i + 2; ++j) { /* further apart, and for i = j, the entry is 0 */
             if (!commutes_at(chain, i, j)) {
                 return false;
             }
@@ -248,7 +248,7 @@ static bool commutes(const vi_chain *chain)
     return true;
 }
 
-/* Are the modes found those that the damping keeps apart, each with a ratio? */
+/* Does the damping keep the modes found apart, each with a ratio? */
 static bool is_diagonal(int n, const vi_chain_modes *modes)
 {
     for (int i = 0; i < n; ++i) {

@@ -3,11 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-/* Held contacts count as independent where what the others leave of a shape is more than this share of it. */
+/* Part of a held contact's shape left by the others, relative to the shape, above which it is independent. */
 static const double INDEPENDENT = 1e-6;
-/* A rate with an imaginary part below this share of it is real; one below the square root's is nearly critical. */
+/* Imaginary part of a rate, relative to the rate, up to which the rate is real. Above REAL and below CRITICAL the rate
+ * is nearly critical, and the modes are not used. */
 static const double REAL = 1e-12, CRITICAL = 1e-6;
-/* Growth that is rounding, as a share of the rate. */
+/* Growth of a rate, relative to the rate, below which it is rounding and set to 0. */
 static const double NO_GROWTH = 1e-13;
 
 static double dot(int n, const double x[], const double y[])
@@ -29,8 +30,8 @@ static void reflect(int n, const double unit[], double x[])
     }
 }
 
-/* Add the reflection after which motions that keep this contact in place, and those before it, have no first components;
- * false where it is next to dependent on those. */
+/* Add the reflection that frees motions with this contact in place of their next first component. False where the
+ * contact nearly depends on the earlier ones. */
 static bool add_reflection(int n, const double shape[], vi_coupled_work *work)
 {
     const int i = work->reflections;
@@ -39,7 +40,7 @@ static bool add_reflection(int n, const double shape[], vi_coupled_work *work)
     for (int l = 0; l < i; ++l) {
         reflect(n, work->reflection[l], v);
         work->triangle[l][i] = v[l];
-        v[l] = 0.0; /* later reflections leave it as it is */
+        v[l] = 0.0; /* later reflections leave v unchanged */
     }
     const double length = sqrt(dot(n, v, v));
     if (!(length > INDEPENDENT * sqrt(dot(n, shape, shape)))) {
@@ -80,7 +81,7 @@ static void reflect_out(const vi_pressed_body *body, const vi_coupled_work *work
     }
 }
 
-/* The forces of the held contacts of which the loads are `load`. */
+/* Forces of the held contacts that balance `load`. */
 static void holding(const vi_pressed_body *body, const vi_coupled_work *work, double load[], double force[])
 {
     reflect_in(body, work, load);
@@ -131,7 +132,7 @@ static bool find_real_modes(const vi_pressed_body *body, vi_coupled_work *work)
     return true;
 }
 
-/* Displacements of the contacts that press, small ones of slow modes to their own digits. */
+/* Displacements of the pressing contacts; small ones of slow modes keep their digits. */
 static void look_at_contacts(const vi_pressed_body *body, vi_coupled_work *work)
 {
     int row = body->modes;
@@ -163,7 +164,7 @@ static void couple(const vi_pressed_body *body, vi_coupled_work *work)
 
 /* ---- damped modes ---- */
 
-/* States are ordered by modes, the fast ones first: what a rotation rounds then is small beside what it turns. */
+/* Place of a mode in the states, fast modes first: the rounding of a rotation is then small beside its result. */
 static int state_of(const vi_coupled_work *work, int i)
 {
     return 2 * (work->real.rank - 1 - i);
@@ -184,7 +185,7 @@ static void fill_matrix(vi_coupled_work *work)
     }
 }
 
-/* The rate of a vector, Rayleigh's quotient: its error is the square of the vector's. */
+/* Rate of a vector by Rayleigh's quotient; its error is the square of the vector's error. */
 static vi_complex rate_of(const vi_coupled_work *work, const vi_complex vector[])
 {
     vi_complex sum = {0.0, 0.0};
@@ -200,7 +201,7 @@ static vi_complex rate_of(const vi_coupled_work *work, const vi_complex vector[]
     return sum;
 }
 
-/* A contact's displacement where modes without damping move by x. */
+/* Displacement of a contact when the undamped modes move by x. */
 static vi_complex weighed(int modes, const double weight[], const vi_complex x[])
 {
     vi_complex sum = {0.0, 0.0};
@@ -211,7 +212,7 @@ static vi_complex weighed(int modes, const double weight[], const vi_complex x[]
     return sum;
 }
 
-/* The forces of the held contacts: what they take off the others' and the body's own. */
+/* Add the forces of the held contacts, which balance the other contacts and the body itself. */
 static void add_holding(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work, int m)
 {
     const vi_complex rate = found->rate[m], *vector = found->vector[m];
@@ -240,7 +241,7 @@ static void add_holding(vi_pressed_modes *found, const vi_pressed_body *body, co
     }
 }
 
-/* What modes without damping that move by x are in all modes. */
+/* Combine undamped modes that move by x to a displacement in all modes. */
 static void combine(const vi_pressed_body *body, const vi_coupled_work *work, const vi_complex x[], vi_complex sum[])
 {
     memset(sum, 0, (size_t)body->modes * sizeof *sum);
@@ -252,7 +253,7 @@ static void combine(const vi_pressed_body *body, const vi_coupled_work *work, co
     }
 }
 
-/* Of a mode without damping, whose state is (natural x, -i rate x): by the larger of the two, which has its digits. */
+/* Displacement of an undamped mode whose state is (natural x, -i rate x), from the larger one, for its digits. */
 static vi_complex displacement(const vi_complex state[2], double natural, vi_complex rate)
 {
     if (natural >= vi_complex_size(rate)) {
@@ -271,21 +272,21 @@ static void add_term(vi_pressed_modes *found, const vi_pressed_body *body, const
     for (int i = 0; i < modes; ++i) {
         const double natural = work->real.value[i];
         x[i] = displacement(&state[state_of(work, i)], natural, rate);
-        /* rate + damping, of a vector, is its stiffness over -rate: no difference of large numbers */
+        /* (rate + damping) vector = -stiffness vector / rate: no difference of large numbers */
         pull[i] = vi_complex_scale(-natural * natural, vi_complex_divide(x[i], rate));
     }
     combine(body, work, x, found->vector[m]);
     combine(body, work, pull, found->pull[m]);
     for (int k = 0; k < body->contacts; ++k) {
         const vi_complex z = {body->stiffness[k] + body->damping[k] * rate.re, body->damping[k] * rate.im};
-        found->force[m][k] = vi_complex_multiply(z, weighed(modes, work->at[k], x)); /* 0 of a held one, for now */
+        found->force[m][k] = vi_complex_multiply(z, weighed(modes, work->at[k], x)); /* 0 for a held contact, for now */
     }
     if (work->reflections > 0) {
         add_holding(found, body, work, m);
     }
 }
 
-/* The slowest rate of those that are left, of a pair and its conjugate the former; -1: none. */
+/* Index of the slowest rate left, the first of a conjugate pair; -1: none. */
 static int slowest(int states, const vi_complex rate[], const bool taken[])
 {
     int best = -1;
@@ -297,13 +298,13 @@ static int slowest(int states, const vi_complex rate[], const bool taken[])
     return best;
 }
 
-/* Terms in order of their rates; false where some are nearly critical, or none of a pair. */
+/* Add terms in the order of their rates; false where rates are nearly critical, or half of a pair is missing. */
 static bool add_terms(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work)
 {
     const int states = 2 * work->real.rank;
     vi_complex rate[VI_STATES];
     bool taken[VI_STATES] = {false};
-    int told = 0;
+    int covered = 0;
     for (int k = 0; k < states; ++k) {
         rate[k] = rate_of(work, work->vector[k]);
         const double size = vi_complex_size(rate[k]);
@@ -314,13 +315,13 @@ static bool add_terms(vi_pressed_modes *found, const vi_pressed_body *body, cons
             return false;
         }
         taken[k] = rate[k].im < 0.0;
-        told += rate[k].im > 0.0 ? 2 : rate[k].im == 0.0 ? 1 : 0;
+        covered += rate[k].im > 0.0 ? 2 : rate[k].im == 0.0 ? 1 : 0;
     }
     for (int k = slowest(states, rate, taken); k >= 0; k = slowest(states, rate, taken)) {
         taken[k] = true;
         add_term(found, body, work, rate[k], work->vector[k]);
     }
-    return told == states;
+    return covered == states;
 }
 
 bool vi_coupled_modes_find(vi_pressed_modes *found, const vi_pressed_body *body, vi_coupled_work *work)

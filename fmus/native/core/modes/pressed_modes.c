@@ -4,19 +4,20 @@
 #include <math.h>
 #include <string.h>
 
-/* Sweeps of the search; five to ten are usual. */
+/* Most sweeps of the search; five to ten are usual. */
 enum { MOST_SWEEPS = 60 };
-/* Steps smaller than this times the distance from the pole end it: the next one would be its square. */
+/* Step, relative to the distance from the pole, below which the search ends: the next step would be its square. */
 static const double CLOSE = 1e-9;
-/* Rates nearer to each other, to their conjugate or to 0 than this times their size do not tell their vectors apart. */
+/* Distance of rates from each other, from their conjugate or from 0, relative to their size. Closer rates have vectors
+ * that cannot be distinguished. */
 static const double APART = 1e-6;
-/* Growth that is rounding, as a share of the rate. */
+/* Growth of a rate, relative to the rate, below which it is rounding and set to 0. */
 static const double NO_GROWTH = 1e-13;
 
-/* Least distance of a first guess from a pole, as a share of the way to the next one. */
+/* Least distance of a first guess from a pole, as a share of the way to the next pole. */
 static const double NOT_ON_A_POLE = 0.05;
 
-/* What one unknown rate is: pole + offset. */
+/* An unknown rate: pole + offset. */
 typedef struct {
     int base;          /* mode of the pole; -1: none */
     int pair;          /* stands for its conjugate too */
@@ -26,7 +27,7 @@ typedef struct {
 typedef struct {
     const vi_pressed_body *body;
     int count, zeros;
-    int mode[VI_MODES]; /* those that the point has a part in */
+    int mode[VI_MODES]; /* the modes with a part in the point */
     vi_complex pole[VI_MODES];
     zero zero[VI_TERMS];
 } search;
@@ -53,8 +54,8 @@ static vi_complex inverse_distance(const search *s, const zero *z, vi_complex a)
     return vi_complex_invert(vi_complex_add(vi_complex_subtract(origin_of(s, z), a), z->offset));
 }
 
-/* The sum of n^2 g over the modes with g = 1 / (s^2 + D s + W), its derivative, and what the poles add to the
- * logarithmic derivative of the polynomial. */
+/* Sum of n^2 g over the modes, with g = 1 / (s^2 + D s + W), and its derivative. poles: part of the poles in the
+ * polynomial's logarithmic derivative. */
 static void sum_modes(const search *s, const zero *z, vi_complex *sum, vi_complex *slope, vi_complex *poles)
 {
     *sum = *slope = *poles = (vi_complex){0.0, 0.0};
@@ -70,7 +71,7 @@ static void sum_modes(const search *s, const zero *z, vi_complex *sum, vi_comple
     }
 }
 
-/* What the other zeros take off the logarithmic derivative: none is found twice. */
+/* Part of the other zeros in the logarithmic derivative; subtracting it prevents finding a zero twice. */
 static vi_complex repulsion(const search *s, int i)
 {
     const zero *z = &s->zero[i];
@@ -91,14 +92,14 @@ static vi_complex repulsion(const search *s, int i)
     return sum;
 }
 
-/* Newton's step for the polynomial whose zeros the rates are, with those found divided out (Aberth, Ehrlich). */
+/* Newton step for the polynomial whose zeros are the rates, with the other zeros divided out (Aberth, Ehrlich). */
 static vi_complex step_of(const search *s, int i)
 {
     const vi_pressed_body *body = s->body;
     const vi_complex rate = rate_of(s, &s->zero[i]);
     vi_complex value, slope, poles;
     sum_modes(s, &s->zero[i], &value, &slope, &poles);
-    if (!body->held[0]) { /* 1 + Z sum */
+    if (!body->held[0]) { /* value = 1 + Z sum */
         const vi_complex z = {body->stiffness[0] + body->damping[0] * rate.re, body->damping[0] * rate.im};
         slope = vi_complex_add(vi_complex_multiply(z, slope), vi_complex_scale(body->damping[0], value));
         value = vi_complex_multiply(z, value);
@@ -113,7 +114,7 @@ static vi_complex step_of(const search *s, int i)
     return step;
 }
 
-/* Count a zero from the pole that is nearest to it now. */
+/* Count a zero from its nearest pole. */
 static void rebase(const search *s, zero *z)
 {
     const vi_complex origin = origin_of(s, z);
@@ -142,7 +143,7 @@ static bool find_zeros(search *s)
             const vi_complex step = step_of(s, i);
             const vi_complex before = z->offset;
             z->offset = vi_complex_add(before, step);
-            if (vi_complex_square(z->offset) == 0.0) { /* next to a pole, not on it */
+            if (vi_complex_square(z->offset) == 0.0) { /* next to a pole, but not on it */
                 z->offset = vi_complex_scale(DBL_EPSILON, before);
             }
             rebase(s, z);
@@ -168,7 +169,7 @@ static void guess(search *s, double square, double decay, double to)
     rebase(s, z);
 }
 
-/* Between two poles: where those two alone would have the zero, but not on one of them. */
+/* Guess the zeros between two poles: where the two alone would have a zero, but not on a pole. */
 static void guess_between(search *s)
 {
     const vi_pressed_body *body = s->body;
@@ -181,7 +182,7 @@ static void guess_between(search *s)
     }
 }
 
-/* The mode that the stop makes: the body's mobility against it. */
+/* The mode made by the stop, from the body's mobility. */
 static void stop_mode(const search *s, double *square, double *decay)
 {
     const vi_pressed_body *body = s->body;
@@ -194,7 +195,7 @@ static void stop_mode(const search *s, double *square, double *decay)
     *decay = body->decay[last] + 0.5 * body->damping[0] * mobility;
 }
 
-/* Its two rates are real where the dashpot is strong. */
+/* Are the two rates of this mode real, because the dashpot is strong? */
 static bool strong_dashpot(const search *s)
 {
     double square, decay;
@@ -250,7 +251,7 @@ static void add_term(vi_pressed_modes *found, const search *s, const zero *z)
     found->share[m] = vi_complex_scale(z->pair ? 2.0 : 1.0, vi_complex_invert(norm));
 }
 
-/* A mode that the point has no part in goes on as it is. */
+/* Add a mode with no part in the point: it stays as it is. */
 static void add_free(vi_pressed_modes *found, const vi_pressed_body *body, int j)
 {
     const int m = found->terms++;
@@ -265,7 +266,7 @@ static void add_free(vi_pressed_modes *found, const vi_pressed_body *body, int j
 
 /* ---- checks ---- */
 
-/* Is each rate told apart from all others, decaying, and on its side of the real axis? */
+/* Is each rate distinct from all others, decaying, and on its side of the real axis? */
 static bool apart(const vi_pressed_modes *found)
 {
     for (int m = 0; m < found->terms; ++m) {
@@ -284,7 +285,7 @@ static bool apart(const vi_pressed_modes *found)
     return true;
 }
 
-/* One mode against a stop: a quadratic. */
+/* One mode against a stop: solve a quadratic. */
 static bool find_single(vi_pressed_modes *found, const vi_pressed_body *body)
 {
     const double n = body->shape[0][0];
@@ -298,7 +299,7 @@ static bool find_single(vi_pressed_modes *found, const vi_pressed_body *body)
         found->rate[m] = rates[m];
         found->vector[m][0] = (vi_complex){1.0, 0.0};
         const vi_complex z = {body->stiffness[0] + body->damping[0] * rates[m].re, body->damping[0] * rates[m].im};
-        /* of a vector of 1 the force is Z n: scaled to -1 as all others are */
+        /* for a vector of 1 the force is Z n: scale it to -1, as for all vectors */
         const vi_complex scale = vi_complex_scale(-1.0, vi_complex_invert(vi_complex_scale(n, z)));
         found->vector[m][0] = scale;
         found->force[m][0] = (vi_complex){-1.0, 0.0};

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* s^2 + D s + W */
+/* Dynamic stiffness s^2 + D s + W of mode j. */
 static vi_complex dynamic_stiffness(const vi_pressed_body *body, vi_complex s, int j)
 {
     const double decay = 2.0 * body->decay[j], natural = sqrt(body->square[j]);
@@ -11,7 +11,7 @@ static vi_complex dynamic_stiffness(const vi_pressed_body *body, vi_complex s, i
     return (vi_complex){detuning + decay * s.re, 2.0 * s.re * s.im + decay * s.im};
 }
 
-/* The mode whose stiffness is least beside its part in the point; -1: the point is a node of all. */
+/* The mode with the least dynamic stiffness over the square of its part in the point; -1: a node of all modes. */
 static int nearest_resonance(const vi_pressed_body *body, vi_complex s)
 {
     double least = HUGE_VAL;

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Largest error of a motion that is taken apart and put together again, relative to its terms; and largest terms,
- * relative to the motion: they cancel next to critical damping. */
+/* Largest error of a motion split into terms and summed again, relative to the terms. LARGEST_TERMS: largest terms,
+ * relative to the motion; next to critical damping they cancel. */
 static const double RECOVERED = 1e-13, LARGEST_TERMS = 1e3;
 
 /* ---- order ---- */
@@ -28,7 +28,7 @@ static void exchange(vi_pressed_modes *found, int a, int b)
     found->share[b] = share;
 }
 
-/* Slow ones first; they are nearly in order. */
+/* Sort the terms, slow ones first; they are nearly in order. */
 void vi_pressed_terms_sort(vi_pressed_modes *found)
 {
     for (int m = 1; m < found->terms; ++m) {
@@ -40,7 +40,7 @@ void vi_pressed_terms_sort(vi_pressed_modes *found)
 
 /* ---- a check ---- */
 
-/* Is a motion that starts like this put together again from its parts, which are not much larger? */
+/* Is a motion with this start recovered from its terms, which are not much larger than the motion? */
 static bool recovers(const vi_pressed_modes *found, const vi_pressed_body *body, const double q[], const double p[])
 {
     vi_complex part[VI_TERMS];
@@ -62,7 +62,7 @@ static bool recovers(const vi_pressed_modes *found, const vi_pressed_body *body,
     return error <= RECOVERED * terms && wrong <= RECOVERED * rates && terms <= LARGEST_TERMS * whole;
 }
 
-/* x without its part along y. */
+/* Subtract from x its part along y. */
 static void take_off(int n, const double y[], double x[])
 {
     double along = 0.0, square = 0.0;
@@ -75,7 +75,7 @@ static void take_off(int n, const double y[], double x[])
     }
 }
 
-/* Take off x what moves the held contacts. */
+/* Subtract from x the parts that move the held contacts. */
 static void keep_held(const vi_pressed_body *body, double x[])
 {
     double unit[VI_PORTS][VI_MODES];

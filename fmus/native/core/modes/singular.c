@@ -4,15 +4,15 @@
 #include <math.h>
 #include <string.h>
 
-/* Two vectors are orthogonal when their cosine is below this: the rounding of a scalar product of 64 terms. */
+/* Cosine of the angle of two vectors up to which they are orthogonal: the rounding of a scalar product of 64 terms. */
 static const double ORTHOGONAL = 8.0 * DBL_EPSILON;
 enum { MOST_SWEEPS = 60 }; /* ten are usual */
 
-/* The matrix as P_rows X D Y' P_columns: below the diagonal X, on it D, above it Y'. */
+/* The matrix as P_rows X D Y' P_columns: X below the diagonal, D on the diagonal, Y' above the diagonal. */
 typedef struct {
     int rows, columns;
     double (*a)[VI_MODES];
-    int row[VI_ROWS], column[VI_MODES]; /* where the rows and columns came from */
+    int row[VI_ROWS], column[VI_MODES]; /* origins of the rows and columns */
 } elimination;
 
 static double dot(int n, const double x[], const double y[])
@@ -48,7 +48,7 @@ static void bring_pivot(elimination *e, int step, int pivot_row, int pivot_colum
     e->column[pivot_column] = column;
 }
 
-/* Bring the largest entry of what is left to the diagonal; false when there is none above 0. */
+/* Bring the largest remaining entry to the diagonal; false when all are 0. */
 static bool pivot(elimination *e, int step)
 {
     double largest = 0.0;
@@ -66,8 +66,8 @@ static bool pivot(elimination *e, int step)
     return largest > 0.0;
 }
 
-/* Gauss with complete pivoting. Without cycles an entry that fills in was 0: nothing is ever subtracted from a
- * number, so every entry of X, D, Y keeps its relative accuracy, and what is 0 is exactly 0. Returns the rank. */
+/* Gaussian elimination with complete pivoting. Without cycles every filled-in entry was 0, so nothing is ever
+ * subtracted. Every entry of X, D, Y keeps its relative accuracy, and zeros are exact. Returns the rank. */
 static int eliminate(elimination *e)
 {
     int step = 0;
@@ -87,7 +87,7 @@ static int eliminate(elimination *e)
     return step;
 }
 
-/* x - 2 v (v.x), v a unit vector: vectors start at component `first`. */
+/* x - 2 v (v.x) for a unit vector v, from component `first` on. */
 static void reflect(int first, int last, const double v[], double x[])
 {
     const double twice = 2.0 * dot(last - first, v + first, x + first);
@@ -96,8 +96,8 @@ static void reflect(int first, int last, const double v[], double x[])
     }
 }
 
-/* X = Q R by Householder's reflections; x[k] is column k on entry, and the unit vector of reflection k after it. R, an
- * upper triangle, is left in r[k], its column k. */
+/* X = Q R by Householder's reflections. x[k] is column k on entry, and the unit vector of reflection k afterwards. r[k]
+ * is column k of the upper triangle R. */
 static void factor(int rows, int rank, double x[][VI_ROWS], double r[][VI_ROWS])
 {
     for (int k = 0; k < rank; ++k) {
@@ -107,7 +107,7 @@ static void factor(int rows, int rank, double x[][VI_ROWS], double r[][VI_ROWS])
         memcpy(r[k], v, (size_t)k * sizeof *v);
         r[k][k] = diagonal;
         v[k] -= diagonal;
-        const double size = sqrt(dot(rows - k, v + k, v + k)); /* >= length, and X has full rank */
+        const double size = sqrt(dot(rows - k, v + k, v + k)); /* >= length, as X has full rank */
         for (int i = k; i < rows; ++i) {
             v[i] /= size;
         }
@@ -117,8 +117,8 @@ static void factor(int rows, int rank, double x[][VI_ROWS], double r[][VI_ROWS])
     }
 }
 
-/* Row k of R D Y', in the order of the columns of a. The pivots do not grow with j, so that the terms of a row are
- * at most of the size of its pivot and their rounding is small beside it. */
+/* Row k of R D Y', in the order of the columns of a. The pivots do not grow with j, so the terms of a row are at most
+ * of the size of its pivot. Their rounding is small beside the row. */
 static void product_row(const elimination *e, int rank, int k, const double (*r)[VI_ROWS], double row[])
 {
     for (int i = 0; i < e->columns; ++i) {
@@ -140,8 +140,7 @@ static void rotate(int n, double cosine, double sine, double x[], double y[])
     }
 }
 
-/* Make two vectors orthogonal, the longer one first; the same rotation for their left companions. Returns whether
- * there was something to do. */
+/* Make two vectors orthogonal, the longer one first, and rotate their left companions alike. False: they were. */
 static bool orthogonalise(int columns, int rank, vi_singular *s, int first, int second)
 {
     double *x = s->right[first], *y = s->right[second];
@@ -161,7 +160,7 @@ static bool orthogonalise(int columns, int rank, vi_singular *s, int first, int 
     return true;
 }
 
-/* One-sided Jacobi: afterwards right[k] = value k times its vector, and left[k] are orthonormal. */
+/* One-sided Jacobi: afterwards right[k] = value k times its vector, and the left[k] are orthonormal. */
 static bool orthogonalise_all(int columns, int rank, vi_singular *s)
 {
     bool moved = true;
@@ -176,7 +175,7 @@ static bool orthogonalise_all(int columns, int rank, vi_singular *s)
     return !moved;
 }
 
-/* Left vectors from their coordinates in the columns of Q. */
+/* Turn coordinates in the columns of Q into left vectors. */
 static void leave_reflections(const elimination *e, int rank, const double (*reflection)[VI_ROWS], double left[])
 {
     double x[VI_ROWS] = {0.0};
@@ -228,7 +227,7 @@ static elimination begin(int rows, int columns, double (*a)[VI_MODES])
     return e;
 }
 
-/* Columns of the unit lower triangle X. */
+/* Copy the columns of the unit lower triangle X. */
 static void columns_of_x(const elimination *e, int rank, double x[][VI_ROWS])
 {
     for (int k = 0; k < rank; ++k) {
@@ -248,7 +247,7 @@ bool vi_singular_find(int rows, int columns, double a[][VI_MODES], vi_singular *
     const int rank = singular->rank = eliminate(&e);
     double x[VI_MODES][VI_ROWS];
     columns_of_x(&e, rank, x);
-    factor(rows, rank, x, singular->left); /* R, until the next loop is through with it */
+    factor(rows, rank, x, singular->left); /* `left` holds R until the next loop is done */
     for (int k = 0; k < rank; ++k) {
         product_row(&e, rank, k, (const double (*)[VI_ROWS])singular->left, singular->right[k]);
     }

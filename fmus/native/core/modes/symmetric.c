@@ -4,9 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-/* An entry is 0 beside the roots of its two diagonal entries below this: the rounding of a few rotations. */
+/* Size of an entry, relative to the roots of its two diagonal entries, up to which it is 0: a few roundings. */
 static const double NEGLIGIBLE = 8.0 * DBL_EPSILON;
-/* Least square of a rotation's scale, 1 + tangent^2: below it the plane has one vector only, to half the digits. */
+/* Least size of 1 + tangent^2 of a rotation; below, the plane has only one vector, to half the digits. */
 static const double DEFECTIVE = 1e-8;
 enum { MOST_SWEEPS = 40 }; /* ten are usual */
 
@@ -14,14 +14,14 @@ typedef struct {
     vi_complex cosine, sine;
 } rotation;
 
-/* A square root, that with a positive real part. */
+/* The square root with a positive real part. */
 static vi_complex root(vi_complex a)
 {
     const double size = sqrt(vi_complex_size(a)), half = 0.5 * atan2(a.im, a.re);
     return (vi_complex){size * cos(half), size * sin(half)};
 }
 
-/* The smaller of the two angles that turn the plane of i and j to its vectors; false where there are none. */
+/* The smaller of the two angles that turn the plane of i and j to its vectors; false where no angle exists. */
 static bool find_rotation(vi_complex first, vi_complex second, vi_complex off, rotation *turn)
 {
     const vi_complex one = {1.0, 0.0};
@@ -48,7 +48,7 @@ static void rotate(int n, const rotation *turn, vi_complex x[], vi_complex y[])
     }
 }
 
-/* Make entry i, j of the matrix 0. */
+/* Make entry (i, j) of the matrix 0. */
 static bool annihilate(int n, vi_complex a[][VI_STATES], vi_complex vector[][VI_STATES], int i, int j)
 {
     rotation turn;

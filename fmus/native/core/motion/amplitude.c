@@ -4,7 +4,7 @@
 
 #include "motion/magnitude.h"
 
-/* The law is a first-order one: beyond these it says nothing. */
+/* Limits of the first-order amplitude law: least frequency, relative to `natural`, and most added damping ratio. */
 static const double LEAST_FREQUENCY = 0.1, MOST_ADDED_RATIO = 1.0;
 
 bool vi_amplitude_acts(const vi_amplitude_law *law)

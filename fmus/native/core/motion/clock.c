@@ -7,7 +7,7 @@
 
 static const double TWO_PI = 6.283185307179586232;
 static const double TWO_PI_LOW = 2.449293598294706414e-16;
-static const double MOST_PERIODS = 9007199254740992.0; /* 2^53: beyond, a double cannot count them */
+static const double MOST_PERIODS = 9007199254740992.0; /* 2^53: a double cannot count periods beyond */
 
 /* Rounding error of the sum `sum` = a + b (Knuth). */
 static double sum_error(double a, double b, double sum)
@@ -46,14 +46,14 @@ bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, dou
     return clock->period >= DBL_MIN && clock->period <= DBL_MAX;
 }
 
-/* The instant `periods` and high + low seconds, as a sum without overlap. */
+/* The instant `periods` and high + low seconds, as a sum whose two numbers do not overlap. */
 static vi_instant instant_of(int64_t periods, double high, double low)
 {
     const double rest = high + low;
     return (vi_instant){periods, rest, low - (rest - high)};
 }
 
-/* Bring 0 <= rest < period; the numbers come from sums that may leave this range by one period. */
+/* The same instant with 0 <= rest < period; the rest given may lie outside this range by one period. */
 static vi_instant normalized(const vi_clock *clock, vi_instant instant)
 {
     while (instant.rest >= clock->period) {
@@ -88,7 +88,7 @@ bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant
     return true;
 }
 
-/* Its periods and rest, less `origin`, s; *low is what the sum that is returned leaves over. */
+/* Seconds from `origin` to `instant` on the clock's own count: the returned sum plus its remainder *low. */
 static double seconds_since(const vi_clock *clock, vi_instant instant, double origin, double origin_low, double *low)
 {
     const double count = (double)instant.periods;
@@ -110,12 +110,12 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant)
 
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
 {
-    const double rests = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests);
+    const double difference = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, difference);
     if (a.periods == b.periods) {
-        return rests + low;
+        return difference + low;
     }
     const double count = (double)(b.periods - a.periods), whole = count * clock->period;
-    return (whole + rests) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
+    return (whole + difference) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
 }
 
 bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
@@ -131,8 +131,9 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
 double vi_clock_elapsed_twofold(const vi_clock *clock, vi_instant a, vi_instant b, double *low)
 {
     const double count = (double)(b.periods - a.periods), whole = count * clock->period;
-    const double rests = b.rest - a.rest, sum = whole + rests;
-    double rounding = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests) + sum_error(whole, rests, sum);
+    const double difference = b.rest - a.rest, sum = whole + difference;
+    double rounding = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, difference)
+                      + sum_error(whole, difference, sum);
     rounding += count * clock->period_low + fma(count, clock->period, -whole);
     const double high = sum + rounding;
     *low = rounding - (high - sum);
@@ -175,7 +176,7 @@ bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_ins
     }
     const double period = TWO_PI / angular_frequency;
     const double since = vi_clock_elapsed(clock, (vi_instant){0, 0.0, 0.0}, now);
-    /* the time is kept beside periods that are counted on: to twice the digits of their sum */
+    /* periods are counted on in the new length, so the time must keep its digits beside the new count */
     const double counted = (fabs((double)now.periods) + 1.0) * period;
     const double time = fabs(vi_clock_time(clock, now));
     const bool keeps_time = time == 0.0 || counted * (8.0 * DBL_EPSILON) <= time;
@@ -191,7 +192,7 @@ static vi_instant at_phase_of(const vi_clock *clock, double angular_frequency, v
     const double rest = turn / w;
     instant.rest_low = (fma(-rest, w, turn) + low) / w;
     instant.rest = rest;
-    if (rest >= clock->period) { /* by rounding: the period that it is in has not ended */
+    if (rest >= clock->period) { /* only by rounding: the period has not ended yet */
         instant.rest = nextafter(clock->period, 0.0);
         instant.rest_low = 0.0;
     }

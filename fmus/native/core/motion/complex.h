@@ -1,4 +1,4 @@
-/* Complex numbers, without <complex.h>, which not all compilers have. */
+/* Complex numbers without <complex.h>, which some compilers lack. */
 #ifndef VIBROIMPACT_COMPLEX_H
 #define VIBROIMPACT_COMPLEX_H
 

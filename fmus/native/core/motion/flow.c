@@ -4,16 +4,17 @@
 
 #include "motion/magnitude.h"
 
-/* The steady response may be this many times larger than the motion before the split loses too many digits. */
+/* Largest steady response that is split off, in units of the motion; above, the split loses too many digits. */
 static const double LARGEST_SPLIT = 8.0;
-/* A stiff dashpot may cost more than this many units of 1 / fastest rate to follow by series; then the split is taken
- * up to the second ratio: its error, 1e-16 of the steady response, is a time error of 1e-16 of the slow decay time. */
+/* Length of an overdamped segment, in units of 1 / fastest rate, above which a series costs too much. The steady
+ * response may then be LARGEST_SPLIT_OVERDAMPED motions: its error, 1e-16 of it, is a time error of 1e-16 of the slow
+ * decay time. */
 static const double LONGEST_SERIES = 1e4;
 static const double LARGEST_SPLIT_OVERDAMPED = 1e10;
-/* Length of a series segment times the fastest rate: the 21st term is below 1e-17 of the first. */
+/* Length of a series segment, in units of 1 / fastest rate; the 21st term is then below 1e-17 of the first. */
 static const double SERIES_REACH = 0.7;
 
-/* stiffness/mass - (damping/(2 mass))^2 without cancellation: critical damping is recognized exactly. */
+/* stiffness/mass - (damping/(2 mass))^2 without cancellation: 0 exactly at critical damping. */
 static double discriminant(double mass, double damping, double stiffness)
 {
     const double square = damping * damping;
@@ -75,7 +76,7 @@ static propagator overdamped(const vi_mode *mode, double slow, double fast, doub
     propagator p = {.slow = slow, .fast = fast};
     p.e_cos = 0.5 * (slow + fast);
     p.e_sin = slow * (lost / (2.0 * mode->rate));
-    /* far from critical Ce - decay Se cancels; near it the two exponentials do */
+    /* far from critical damping Ce - decay Se cancels; near it the difference of the exponentials cancels */
     p.back = mode->rate > 0.5 * mode->decay ? (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate)
                                             : p.e_cos - mode->decay * p.e_sin;
     return p;
@@ -132,8 +133,8 @@ void vi_mode_propagator_by(const vi_mode *mode, double u, const vi_mode_function
     take_rows(mode, &p, phi);
 }
 
-/* `u` seconds after the start of a segment that is counted from before: the phase angle to twice the digits, so that it
- * is as exact after 10^6 periods as after one. */
+/* Propagator `u` seconds after the start of a segment whose motion is counted from an earlier instant. The phase angle
+ * has twice the digits, so it is as exact after 10^6 periods as after one. */
 static propagator propagate_from_before(const vi_segment *s, double u)
 {
     const vi_mode *mode = s->mode;
@@ -156,7 +157,7 @@ static inline propagator propagate_segment(const vi_segment *s, double u)
 
 /* ---- the split form ---- */
 
-/* The steady response that may be split off: a multiple of the displacements that the segment shows. */
+/* Largest steady response that may be split off, m: a multiple of the displacements within the segment. */
 static double largest_split(const vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
@@ -168,7 +169,7 @@ static double largest_split(const vi_segment *s, double x, double v)
     return LARGEST_SPLIT * (fabs(x) + (fabs(v) + load * time) * time);
 }
 
-/* Try to split off the steady response and the level of the held input; false when digits would be lost. */
+/* Split off the steady response and the level of the held input; false when digits would be lost. */
 static bool split(vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
@@ -204,7 +205,7 @@ static void bound_split(vi_segment *s)
     s->scale = fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
 }
 
-/* Bound on the homogeneous |x''''| from the energy of the present state, which never grows. */
+/* Bound on the homogeneous |x''''| from the energy of the present state; the energy never grows. */
 static double energy_bound(const vi_mode *mode, double x, double v)
 {
     const double damping = 2.0 * mode->decay;
@@ -249,24 +250,24 @@ static void split_at(const vi_segment *s, double u, vi_motion *m)
 
 /* ---- the series form ---- */
 
-/* 1 / ((n + 1) (n + 2)), by which the equation gives a Taylor coefficient from those before it: no division waits. */
+/* 1 / ((n + 1) (n + 2)): factor of the differential equation's recurrence for Taylor coefficient n + 2. */
 static const double SHARE[VI_SERIES_ORDER - 1] = {1.0 / 2.0,   1.0 / 6.0,   1.0 / 12.0,  1.0 / 20.0,  1.0 / 30.0,
                                                   1.0 / 42.0,  1.0 / 56.0,  1.0 / 72.0,  1.0 / 90.0,  1.0 / 110.0,
                                                   1.0 / 132.0, 1.0 / 156.0, 1.0 / 182.0, 1.0 / 210.0, 1.0 / 240.0,
                                                   1.0 / 272.0, 1.0 / 306.0, 1.0 / 342.0, 1.0 / 380.0};
-/* n (n - 1) (n - 2) (n - 3), by which the fourth derivative has a Taylor coefficient. */
+/* n (n - 1) (n - 2) (n - 3): factor of Taylor coefficient n in the fourth derivative. */
 static const double FOURTH[VI_SERIES_ORDER + 1] = {0.0,     0.0,     0.0,     0.0,     24.0,    120.0,   360.0,
                                                    840.0,   1680.0,  3024.0,  5040.0,  7920.0,  11880.0, 17160.0,
                                                    24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
 
-/* Modes whose coefficients are found side by side: each of a mode waits for the one before it. */
+/* Modes whose coefficients are found side by side, since each coefficient of a mode waits for the one before. */
 enum { ABREAST = 8 };
 
-/* By n, then by mode. */
+/* Taylor coefficients, indexed by order n, then by mode. */
 typedef double coefficients[VI_SERIES_ORDER + 1][ABREAST];
 
-/* Taylor coefficients of `count` modes from the differential equation itself. Each caller gives a constant: loops over
- * one mode are none, those over ABREAST are vectors. */
+/* Taylor coefficients of `count` modes from the differential equation itself. Each caller passes a constant count:
+ * loops over one mode vanish, loops over ABREAST become vectors. */
 static inline void find_coefficients(coefficients c, const vi_segment s[], const double x[], const double v[],
                                      const int count)
 {
@@ -295,7 +296,7 @@ static inline void find_coefficients(coefficients c, const vi_segment s[], const
     }
 }
 
-/* Begin the series of `count` modes whose segments are set out, with bounds up to their ends. */
+/* Begin the series of `count` prepared segments, with bounds up to the ends of the segments. */
 static inline void begin_series(vi_segment s[], const double x[], const double v[], const int count)
 {
     coefficients c;
@@ -389,7 +390,7 @@ void vi_segment_part(const vi_segment *s, double u, vi_part *part)
     }
 }
 
-/* ---- the door ---- */
+/* ---- segments ---- */
 
 vi_phase vi_phase_of(double angle)
 {
@@ -409,7 +410,7 @@ void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *
                                     : homogeneous_bound(segment, 1.0, 1.0, segment->x, segment->v) + mode->steady_snap;
 }
 
-/* What is known of a segment before its form is. */
+/* Set the members of a segment that do not depend on its form. */
 static void set_out(vi_segment *segment, const vi_mode *mode, vi_phase phase, double held, double held_rate,
                     double length)
 {
@@ -472,7 +473,7 @@ void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
     }
 }
 
-/* As the series of a part gives them. */
+/* The same bits as from the series of a part. */
 static void series_end(const vi_segment *s, double u, double *displacement, double *velocity)
 {
     const double *c = s->coefficient;

@@ -3,9 +3,9 @@
  *     x'' + 2 decay x' + stiffness x = force cos(angular_frequency t) + held + held_rate (t - t0)
  *
  * all per unit mass. Two forms of the same solution, chosen once for each segment:
- *  - the steady response split off, wherever it is not much larger than the motion itself;
- *  - otherwise (near resonance, slow forcing, no spring) a Taylor series to the last bit on a short segment:
- *    subtracting a huge steady response would lose the digits it is larger by.
+ *  - the steady response is split off, wherever it is not much larger than the motion itself;
+ *  - otherwise (near resonance, slow forcing, no spring) a Taylor series, exact to the last bit on a short segment.
+ *    A huge steady response would cost the digits by which it exceeds the motion.
  */
 #ifndef VIBROIMPACT_FLOW_H
 #define VIBROIMPACT_FLOW_H
@@ -40,7 +40,7 @@ typedef struct {
     double snap_bound; /* >= |x''''| from here to the end of the segment */
 } vi_motion;
 
-/* The same for the part of a motion that is not forced. */
+/* The unforced part of a motion at one instant, with bounds that hold from here on. */
 typedef struct {
     double x, v, a, j;
     double snap_bound; /* >= |fourth derivative| from here to the end of the segment */
@@ -58,71 +58,71 @@ typedef struct {
     vi_phase phase;       /* of the force at the start */
     double held, held_rate;
     double length;        /* the segment is valid for 0 <= u <= length, s */
-    double origin;        /* displacements of the segment are counted from here, m: 0 when split, else the start */
+    double origin;        /* displacements are counted from here, m: 0 when split, else the start's */
     bool series;
     double coefficient[VI_SERIES_ORDER + 1]; /* Taylor, when series */
     double series_snap_bound;
-    double x, v;          /* homogeneous state, when split, `since` before the start */
+    double x, v;          /* homogeneous state, when split, at `since` seconds before the start */
     double since, since_low; /* s, and its rounding */
     double start, start_rate; /* homogeneous displacement and velocity at the start, when split */
     double level, level_rate; /* particular solution of the held input */
     double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
     double slow_part, fast_part; /* amplitudes of the two exponentials when overdamped */
-    double scale;         /* size of the terms added up for a displacement, m: its rounding is 1e-16 of this */
+    double scale;         /* sum of the sizes of a displacement's terms, m; rounding is 1e-16 of it */
 } vi_segment;
 
 /* Prepare a mode; mass > 0, stiffness >= 0, damping >= 0, angular_frequency >= 0 in SI units. */
 void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
                    double angular_frequency);
 
-/* Another harmonic force on it: amplitude per unit mass (m/s^2), angular frequency (rad/s). */
+/* Put another harmonic force on the mode: amplitude per unit mass (m/s^2), angular frequency (rad/s). */
 void vi_mode_drive(vi_mode *mode, double force, double angular_frequency);
 
 /* Begin a segment of at most `length` seconds at displacement x, velocity v and forcing phase (rad). The series form
- * may shorten the length. Low bounces ask for it (`local`): it counts from the start, so that a bounce of 1e-12 m on a
- * stop at 1 m keeps all its digits. */
+ * may shorten the length. `local` demands the series form, for low bounces: displacements are counted from the start,
+ * so a bounce of 1e-12 m on a stop at 1 m keeps all its digits. */
 void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
                       double held_rate, double length, bool local);
 
-/* Begin local segments of several modes at one instant, each as one alone is begun. */
+/* Begin local segments of several modes at one instant, with the same bits as vi_segment_start for each mode. */
 void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[],
                              const double v[], vi_phase phase, const double held[], const double held_rate[],
                              double length);
 
-/* Count the homogeneous part of a split segment, whose mode is underdamped, from its state (x, v), of that
- * amplitude, `since` seconds (with their rounding) before the start, on the same motion: what rounding has added meanwhile is left behind. */
+/* Count the homogeneous part of a split segment from an earlier state of the same motion, which drops the rounding
+ * added since. The mode is underdamped. (x, v) and `amplitude` hold `since` + `since_low` seconds before the start. */
 void vi_segment_continue(vi_segment *segment, double x, double v, double amplitude, double since, double since_low);
 
 vi_phase vi_phase_of(double angle);
 
-/* Displacement and velocity after `u` >= 0 of the unforced mode: x = phi[0] x0 + phi[1] v0, v = phi[2] x0 + phi[3] v0. */
+/* Displacement and velocity `u` >= 0 s later, unforced: x = phi[0] x0 + phi[1] v0, v = phi[2] x0 + phi[3] v0. */
 void vi_mode_propagator(const vi_mode *mode, double u, double phi[4]);
 
-/* Functions of the time u that a propagator is made of. */
+/* Functions of the time u from which a propagator is built. */
 typedef struct {
-    double slow, fast;   /* exp(-slow u) and exp(-fast u) of an overdamped mode; of others both are exp(-decay u) */
-    double lost;         /* of an overdamped mode: 1 - exp(-2 rate u) */
-    double cosine, sine; /* of an underdamped mode: of rate u */
+    double slow, fast;   /* exp(-slow u) and exp(-fast u) if overdamped; else both exp(-decay u) */
+    double lost;         /* 1 - exp(-2 rate u), if overdamped */
+    double cosine, sine; /* of rate u, if underdamped */
 } vi_mode_functions;
 
-/* The same from functions that the caller has found in its own way. */
+/* Propagator as vi_mode_propagator, from functions that the caller has evaluated. */
 void vi_mode_propagator_by(const vi_mode *mode, double u, const vi_mode_functions *functions, double phi[4]);
 
-/* The motion at the start, from the state (x, v) that the segment was begun with: no rounding, no evaluation. */
+/* The motion at the start, from the state (x, v) at which the segment was begun: no rounding, no evaluation. */
 void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *motion);
 
 /* The motion `u` seconds after the start. */
 void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion);
 
-/* After `u` seconds, of a split segment its homogeneous part (without steady response and level), of a series all of it.
- * Bodies of many modes add these up. At the start it is what the segment was begun with: no evaluation. */
+/* The part of a segment after `u` seconds: the homogeneous part of a split segment (no steady response, no level), or
+ * all of a series. Bodies of many modes add these parts up. At the start the part is the given state: no evaluation. */
 void vi_segment_part(const vi_segment *segment, double u, vi_part *part);
 
-/* Displacement and velocity after any u within a series, of a split segment after any u at all: the forcing phase there
- * is known exactly. */
+/* Displacement and velocity after `u` seconds at a forcing phase that is known exactly. u: within the segment for a
+ * series, any time for a split segment. */
 void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, double *x, double *v);
 
-/* Bounds of the displacement for all later time; false when there are none (series form, sloping input). */
+/* Bounds of the displacement for all later time; false when no bounds exist (series form, sloping input). */
 bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest);
 
 /* Contact acceleration (m/s^2) and its slope for a mass held at displacement x, at forcing phase `phase`. */

@@ -11,7 +11,7 @@ double vi_magnitude(double x, double y)
     int exponent;
     (void)frexp(large, &exponent);
     const double a = ldexp(large, -exponent), b = ldexp(small, -exponent);
-    /* both squares with their roundings, then a step of Newton on the square root of the sum */
+    /* both squares with their roundings, then a Newton step on the square root of the sum */
     const double square = a * a, other = b * b, sum = square + other;
     const double rounding = ((square - sum) + other) + (fma(a, a, -square) + fma(b, b, -other));
     const double root = sqrt(sum);

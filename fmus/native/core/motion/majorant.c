@@ -3,18 +3,18 @@
 #include <stdbool.h>
 
 static const double THIRD = 1.0 / 3.0, TWELFTH = 1.0 / 12.0;
-/* A limit this many times the certified step is too far away for bisection to tell much. */
+/* Ratio of limit to certified step above which bisection gains little; the limit is then lowered first. */
 static const double FAR = 64.0;
 
-/* Up to s the quartic lies below the parabola with this acceleration: a + j s/3 + bound s^2/12 is convex in s, so it
- * is largest at an end. */
+/* Acceleration of a parabola that approaches at least as fast as the quartic up to s. The quartic's coefficient of
+ * t^2/2 is a + j t/3 + bound t^2/12, which is convex in t: its largest value is at an end. */
 static inline double acceleration_up_to(const vi_approach *p, double s)
 {
     return p->acceleration + vi_max(0.0, s * (p->jerk * THIRD + s * (p->bound * TWELFTH)));
 }
 
-/* The longest s up to which that acceleration is not positive; 0 when there is none. A body that does not approach
- * and is not accelerated towards the stop cannot reach it before. */
+/* The longest s up to which that acceleration is not positive; 0 when there is none. Until then a body that moves away
+ * from the stop cannot reach the stop. */
 static double longest_retreat(const vi_approach *p)
 {
     const double slope = p->jerk * THIRD, bend = p->bound * TWELFTH, a = p->acceleration;
@@ -25,7 +25,7 @@ static double longest_retreat(const vi_approach *p)
     return slope > 0.0 ? -2.0 * a / (slope + root) : bend > 0.0 ? (root - slope) / (2.0 * bend) : HUGE_VAL;
 }
 
-/* A step by which the quartic has a root: there its last term is larger than all that can hold it back. */
+/* A step by which the quartic surely has a root: its last term then exceeds all terms that could hold it back. */
 static double surely_passed(const vi_approach *p)
 {
     if (!(p->bound > 0.0)) {
@@ -37,8 +37,8 @@ static double surely_passed(const vi_approach *p)
     return p->velocity < 0.0 ? vi_max(s, cbrt(-share * p->velocity)) : s;
 }
 
-/* Does the parabola with this acceleration clear the stop up to s? One that bends away from it may dip in between:
- * the answer is then no, unless it never approaches. */
+/* Does the parabola with this acceleration clear the stop up to s? A parabola that bends away from the stop may dip in
+ * between: the answer is then no, unless the body never approaches. */
 static inline bool clears(const vi_approach *p, double acceleration, double s)
 {
     return (acceleration >= 0.0 || p->velocity <= 0.0)
@@ -47,8 +47,8 @@ static inline bool clears(const vi_approach *p, double acceleration, double s)
 
 double vi_certified_step(const vi_approach *p, double horizon)
 {
-    /* A step s is certified when the parabola with acceleration_up_to(s) has no root before s. `limit` is never
-     * certified too small: it is the root under the least acceleration. */
+    /* A step s is certified when the parabola with acceleration_up_to(s) has no root before s. `limit` is an upper
+     * bound of every certified step: the root under the least acceleration. */
     double limit = vi_min(horizon, vi_parabola_root(p->clearance, p->velocity, p->acceleration));
     double certified = vi_parabola_root(p->clearance, p->velocity, acceleration_up_to(p, limit));
     if (!(certified < limit)) {

@@ -1,7 +1,7 @@
 #include "motion/origin.h"
 
-/* Decay (times decay rate) after which a damped motion is counted anew: its bounds, taken at the origin, stay tight. */
-static const double KEPT = 0.1;
+/* Decay rate times time above which a damped motion gets a new origin. Bounds taken at the origin stay tight below. */
+static const double MOST_DECAY = 0.1;
 
 static bool goes_on(const vi_origin *origin, const vi_segment *segment, double x, double v)
 {
@@ -26,7 +26,7 @@ void vi_origin_follow(const vi_origin *origin, vi_segment *segment, const vi_clo
         since->at = origin->at;
         since->high = vi_clock_elapsed_twofold(clock, origin->at, now, &since->low);
     }
-    if (segment->mode->decay * since->high <= KEPT) {
+    if (segment->mode->decay * since->high <= MOST_DECAY) {
         vi_segment_continue(segment, origin->x, origin->v, origin->amplitude, since->high, since->low);
     }
 }

@@ -4,12 +4,12 @@
 
 #include "motion/majorant.h"
 
-/* After so many steps below the noise a value counts as zero also where it rises: of a value that is nothing but
- * rounding, each step would certify only the next few roundings. */
+/* Steps below the noise after which a value counts as zero even where it rises. Within mere rounding, each step would
+ * certify only the next few roundings. */
 static const int LONGEST_CRAWL = 64;
 
-/* After so many steps the fourth derivative's bound over all that is left is taken for too wide. The next step has one
- * over this multiple of the last one's length. */
+/* Steps after which the bound on the fourth derivative over the whole remaining length counts as too wide. From then on
+ * the bound covers WIDER times the last step. */
 static const int LONGEST_APPROACH = 256;
 static const double WIDER = 8.0;
 
@@ -28,7 +28,7 @@ void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
     value[3] = 6.0 * j;
 }
 
-/* n (n - 1) (n - 2) (n - 3): what the fourth derivative makes of the n-th power. */
+/* n (n - 1) (n - 2) (n - 3): factor of power n in the fourth derivative. */
 static const double FOURTH[VI_ORDER + 1] = {0.0,      0.0,      0.0,      0.0,      24.0,     120.0,   360.0,
                                             840.0,    1680.0,   3024.0,   5040.0,   7920.0,   11880.0, 17160.0,
                                             24024.0,  32760.0,  43680.0,  57120.0,  73440.0,  93024.0, 116280.0,
@@ -63,7 +63,7 @@ double vi_polynomial_size(const double c[VI_ORDER + 1], double length)
     return size;
 }
 
-/* The last step to a zero that is nearer than rounding can tell. */
+/* The last step to a zero that is closer than rounding resolves. */
 static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p, double length, double noise)
 {
     const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
@@ -71,7 +71,7 @@ static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p
     double value[4];
     const double root = vi_min(length, u + step);
     vi_polynomial_at(c, root, value);
-    if (!(fabs(value[0]) <= 2.0 * noise)) { /* the velocity is no more than rounding, as the value is */
+    if (!(fabs(value[0]) <= 2.0 * noise)) { /* the velocity is mere rounding, as the value is */
         return (vi_fall){true, u, p->velocity};
     }
     return (vi_fall){true, root, square < 0.0 ? 0.0 : vi_max(0.0, -value[1])};

@@ -1,7 +1,7 @@
-/* The Taylor series of a real power of a series, coefficient by coefficient as those of its base become known.
+/* Taylor series of a real power of a series, one coefficient at a time as the coefficients of the base become known.
  *
- * power = base ^ exponent has power' base = exponent power base'. Its coefficients are stored backwards, so that those of a
- * product are sums of products of two rows.
+ * power = base ^ exponent has power' base = exponent power base'. The coefficients of the power are stored backwards,
+ * so that the coefficients of a product are sums of products of two rows.
  */
 #ifndef VIBROIMPACT_POWER_SERIES_H
 #define VIBROIMPACT_POWER_SERIES_H
@@ -17,7 +17,7 @@ enum { VI_POWER_ROOM = VI_ORDER + 1 + VI_LANES };
 typedef struct {
     double exponent;
     int order;                                        /* coefficients 0 to `order` of the power are known */
-    double base[VI_POWER_ROOM], slope[VI_POWER_ROOM]; /* coefficient n of the base, and n times it; from 1 on */
+    double base[VI_POWER_ROOM], slope[VI_POWER_ROOM]; /* from 1 on: coefficient n of the base, and n times it */
     double behind[VI_POWER_ROOM];                     /* coefficient n of the power, at [VI_ORDER - n]; all but the last */
     double base_first, first, power; /* coefficient 0 of the base and of the power, coefficient `order` of the power */
 } vi_power_series;
@@ -31,8 +31,8 @@ static inline void vi_power_series_begin(vi_power_series *p, double exponent, do
     p->first = p->power = pow(first, exponent);
 }
 
-/* One order more, from the next coefficient of the base. Returns the coefficient of power base' that is known by now: the
- * one before the new order. The newest numbers are added last and stored afterwards: no sum waits for them. */
+/* Extend the series by one order, from the next coefficient of the base. Returns the newest known coefficient of power
+ * base': the one before the new order. The newest numbers are added last and stored afterwards: no sum waits. */
 static inline double vi_power_series_extend(vi_power_series *p, double next)
 {
     const int n = ++p->order, width = VI_WHOLE_LANES(n);

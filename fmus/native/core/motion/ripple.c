@@ -1,6 +1,6 @@
 #include "motion/ripple.h"
 
-/* A part is let out only when the bound without it is smaller by this factor: each trial costs a step's arithmetic. */
+/* Ratio of bounds above which leaving a part out is tried; each trial costs a step's arithmetic. */
 static const double WORTH_A_TRIAL = 3.0;
 
 double vi_rippling_step(const vi_part sum[], const double ripple[], int n, double offset, double sign, double horizon)

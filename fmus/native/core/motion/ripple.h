@@ -1,4 +1,4 @@
-/* Certified steps of a sum of motions of which the fast ones ripple: small displacements, large accelerations. */
+/* Certified steps of a sum of motions whose fast parts ripple: small displacements, large accelerations. */
 #ifndef VIBROIMPACT_RIPPLE_H
 #define VIBROIMPACT_RIPPLE_H
 
@@ -15,15 +15,15 @@ static inline void vi_part_add(vi_part *sum, double weight, const vi_part *part)
     sum->snap_bound += fabs(weight) * part->snap_bound;
 }
 
-/* A motion with clearance = offset - sign * displacement, seen from its stop. */
+/* The approach of a motion to its stop, with clearance = offset - sign * displacement. */
 static inline vi_approach vi_part_approach(const vi_part *sum, double offset, double sign)
 {
     return (vi_approach){offset - sign * sum->x, sign * sum->v, sign * sum->a, sign * sum->j, sum->snap_bound};
 }
 
-/* A certified step, as vi_certified_step, of the motion sum[n]; sum[m] is what it is without its last n - m parts,
- * of which part m never moves it by more than ripple[m]. Where the clearance is larger than their ripple the last
- * parts are let out and the ripple is taken off the clearance. Any number of them may be; the longest step wins. */
+/* A certified step, as vi_certified_step, of the motion sum[n]. sum[m] is this motion without its last n - m parts;
+ * part m never moves it by more than ripple[m]. Where the clearance exceeds the ripple of the last parts, they are left
+ * out and their ripple is subtracted from the clearance. The longest step over all numbers of left-out parts wins. */
 double vi_rippling_step(const vi_part sum[], const double ripple[], int n, double offset, double sign, double horizon);
 
 #endif

@@ -1,15 +1,15 @@
-/* Sums over rows of numbers, by so many at once as compilers turn into vectors of every machine: in the same order, so
- * with the same bits, whatever the vectors are. */
+/* Sums over rows of numbers, several at once so that compilers make vectors for every machine. The order of the sums is
+ * fixed: their bits are the same whatever the vectors are. */
 #ifndef VIBROIMPACT_ROWS_H
 #define VIBROIMPACT_ROWS_H
 
-/* Rows are read by whole lanes: they have room for them, and zeros behind their last number. */
+/* Rows are read by whole lanes: each row has room for them, with zeros behind its last number. */
 enum { VI_LANES = 2 };
 
-/* Numbers that rows of `count` are read over. */
+/* Numbers that are read from a row of `count` numbers. */
 #define VI_WHOLE_LANES(count) (((count) + VI_LANES - 1) / VI_LANES * VI_LANES)
 
-/* Sum of the products of two rows; width: whole lanes. */
+/* Sum of the products of two rows; width: numbers in whole lanes. */
 static inline double vi_row_dot(const double *restrict a, const double *restrict b, int width)
 {
     double sum[VI_LANES] = {0.0};

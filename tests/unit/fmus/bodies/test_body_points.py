@@ -1,4 +1,4 @@
-"""Bodies by the parameters of their FMUs: both views are one body, at each point of a sweep."""
+"""Bodies from the parameters of their FMUs: both views describe the same body, at each point of a sweep."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_both_views_of_a_body_are_the_same_modes_under_the_same_force(fmu: str) 
     assert lanes.stiffness.shape == (len(orbit.frequencies), 3)
     np.testing.assert_allclose(lanes.stiffness[:, 0], orbit.frequencies**2, rtol=1e-14)
     np.testing.assert_allclose(lanes.decay[:, 1], orbit.damping_ratios * orbit.frequencies, rtol=1e-14)
-    # what is seen of a steady force does not depend on the coordinates
+    # the observed response to a steady force does not depend on the coordinates
     seen = (lanes.observed * lanes.force / lanes.stiffness)[:, 2].sum()
     assert seen == pytest.approx((orbit.observed * orbit.force / orbit.frequencies**2).sum(), rel=1e-13)
     answer = (lanes.shape[0] * lanes.impulse[0])[:, 0].sum()

@@ -1,4 +1,4 @@
-"""`vibroimpact fmu` as a person uses it: what it lists, and what it says of misuse."""
+"""`vibroimpact fmu` as a person uses it: its lists, and its messages for misuse."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_the_list_names_every_component_in_both_versions_of_fmi() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ("export user-contact-law", "--law: expected the Python file of your law, got nothing."),
         ("export beam --law my_law.py", "--law: expected the component user-contact-law with it, got beam."),
@@ -30,9 +30,9 @@ def test_the_list_names_every_component_in_both_versions_of_fmi() -> None:
         ("build --output FILE", "--output: expected a folder to fill"),
     ],
 )
-def test_misuse_leaves_with_2_and_one_line(arguments: str, told: str, tmp_path: Path) -> None:
+def test_misuse_leaves_with_2_and_one_line(arguments: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     done = in_this_process("fmu", *arguments.replace("FILE", str(tmp_path / "file")).split())
     assert done.returncode == 2
-    assert done.stderr.startswith(told)
+    assert done.stderr.startswith(message)
     assert len(done.stderr.splitlines()) == 1

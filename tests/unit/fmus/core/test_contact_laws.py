@@ -1,4 +1,4 @@
-"""Every contact law of the table of the core: its energy, its force, its parameters; and numbers of no law."""
+"""Every contact law in the table of the core: its energy, its force, its parameters; and unknown numbers."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from vibroimpact.fmus.packaging.build import NATIVE
 from vibroimpact.fmus.packaging.description.contact_laws import contact_laws as read_laws
 
 OWN = [law for law in contact_laws().values() if law.stop != "none" and not law.external]
-#: Part of a contact's time over which the work is integrated: a power law is not smooth where it ends.
+#: Part of a contact's time over which the work is integrated: a power law is not smooth at the end of contact.
 MOST_OF_IT = 0.8
-#: Contacts with power laws are followed to a tolerance of 1e-10 at each of their segments.
+#: Relative tolerance for power laws: each segment of a contact is followed to 1e-10.
 FOLLOWED = 1e-8
 STIFFNESS, EXPONENT = 1e4, 2.3
 CASES = [(0.3, 2.0, 0.4), (7.0, 0.05, 0.9)]
-"""Mass, kg; speed of touch-down, m/s; damping of the stop times that speed, or over sqrt(stiffness mass)."""
+"""Mass, kg; speed at touch-down, m/s; damping of the stop times this speed, or over sqrt(stiffness mass)."""
 
 
 class Law(ctypes.Structure):
@@ -62,7 +62,7 @@ def test_the_energy_that_a_stop_takes_is_the_integral_of_its_force(
     law: ContactLaw, mass: float, speed: float, loss: float
 ) -> None:
     root = math.sqrt(mass)
-    # a law whose damping multiplies its force has it per speed, else per rate of the stop
+    # the damping of a law that multiplies its force is per speed, else per rate of the stop
     numbers = {"stiffness": STIFFNESS, "damping": loss / speed, "exponent": EXPONENT}
     stop = Stop([1.0 / root], law=law.name, **numbers)
     own = Law(law.number, 1.0, 0.0, **numbers)
@@ -71,7 +71,7 @@ def test_the_energy_that_a_stop_takes_is_the_integral_of_its_force(
             body.advance(0.1 / speed)
         began, duration = float(body.impacts[0][1]), float(body.impacts[0][7])
     nodes, weights = np.polynomial.legendre.leggauss(60)
-    # time runs as a square from touch-down, where a power law is not smooth either
+    # time is the square of a parameter from touch-down, where a power law is not smooth either
     roots, end = 0.5 * (nodes + 1.0), MOST_OF_IT * duration
     times, steps = end * roots**2, 0.5 * weights * 2.0 * end * roots
     work = 0.0
@@ -118,10 +118,10 @@ def test_a_number_that_is_no_laws_is_an_error_at_the_start(
     fmu = ComponentFmu(name, {variable: number}, version=version, initialize=False)
     with fmu, pytest.raises(FMICallException):
         fmu.initialize(0.0)
-    (said,) = [message for message in fmu.messages if "expected" in message]
-    assert f"{variable}: expected " in said
-    assert all(f"{law.number} ({law.name})" in said for law in OWN)
-    assert said.endswith(f", got {number}")
+    (message,) = [message for message in fmu.messages if "expected" in message]
+    assert f"{variable}: expected " in message
+    assert all(f"{law.number} ({law.name})" in message for law in OWN)
+    assert message.endswith(f", got {number}")
 
 
 def test_a_name_or_number_that_the_core_has_no_law_of_is_an_error() -> None:
@@ -137,7 +137,7 @@ def test_a_row_of_the_table_in_another_form_is_an_error_of_the_build(tmp_path: P
         contact_laws()
     )
     table = tmp_path / "contact_law.c"
-    for before, after, said in (
+    for before, after, message in (
         (
             '{.name = "hertz",',
             '{.stop = VI_YIELDING_STOP, .name = "hertz",',
@@ -149,5 +149,5 @@ def test_a_row_of_the_table_in_another_form_is_an_error_of_the_build(tmp_path: P
     ):
         assert text.count(before) == 1
         table.write_text(text.replace(before, after), encoding="utf-8")
-        with pytest.raises(ComponentFileError, match=said):
+        with pytest.raises(ComponentFileError, match=message):
             read_laws(table)

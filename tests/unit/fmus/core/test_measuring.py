@@ -1,4 +1,4 @@
-"""The measuring chain of the C core: against other people's integrators and functions, and what it refuses."""
+"""The measuring chain of the C core against independent integrators and functions, and its refusals."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def seen_by_solver(natural: float, ratio: float, times: Array, hits: Array, impu
         under_way = [(hit, peak) for hit, peak in pulses if hit < middle < hit + DURATION]
 
         def rate(t: float, y: Array, under_way: list[tuple[float, float]] = under_way) -> list[float]:
-            # Python's floats: the solver asks a hundred thousand times
+            # plain floats: the solver calls this a hundred thousand times
             load = sum(peak * math.sin(math.pi * (t - hit) / DURATION) for hit, peak in under_way)
             place, speed = y.tolist()
             return [speed, w * w * (load - place) - 2.0 * ratio * w * speed]
@@ -75,7 +75,7 @@ def test_a_jump_of_the_force_over_a_picosecond_rings_as_a_step_does() -> None:
     damped = w * np.sqrt(1.0 - ratio**2)
     decay = np.exp(-ratio * w * after)
     step = 1.0 - decay * (np.cos(damped * after) + ratio * w / damped * np.sin(damped * after))
-    # the jump comes half its length after its start
+    # the jump comes half of its length after its start
     assert np.max(np.abs(volts[2:] - step)) < 2.0 * w * jump
 
 
@@ -110,7 +110,7 @@ def test_2048_half_sines_may_overlap_and_no_more() -> None:
 
 
 def test_gaussian_numbers_are_the_same_everywhere() -> None:
-    # rounded by nothing but IEEE 754: other bits are another generator
+    # only IEEE 754 rounding is involved: other bits mean another generator
     assert [float.hex(x) for x in gaussian(1, 2, 3, 3)] == GAUSSIAN_BITS
     assert np.array_equal(gaussian(1, 2, 0, 1000)[700:], gaussian(1, 2, 700, 300))
 

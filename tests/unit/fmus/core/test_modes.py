@@ -1,4 +1,4 @@
-"""What `beam_modes` and `residual_vectors` refuse, and in which words."""
+"""Refusals of `beam_modes` and `residual_vectors`, and their messages."""
 
 import numpy as np
 import pytest

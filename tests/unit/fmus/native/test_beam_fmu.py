@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from support.component_fmu import HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT, VERSIONS, ComponentFmu, each, stop
 from support.tolerance import ORBIT, PRINTED_12, ROUNDING, SEQUENCE
 
-#: The strip of aluminium that the FMU starts with. equations.md 6.6
+#: The aluminium strip of the FMU's start values. equations.md 6.6
 RIGIDITY = 70e9 * 0.02 * 0.002**3 / 12.0
 LENGTH, BEAM_MASS = 0.25, 2700.0 * 0.02 * 0.002 * 0.25
 TIP_STIFFNESS = 3.0 * RIGIDITY / LENGTH**3
 FORCE, UNIFORM, MODE, BASE_ACCELERATION = 1, 2, 3, 4
 COLLOCATION = 2
-#: Clamped-free. equations.md 6.2
+#: Clamped-free eigenvalues. equations.md 6.2
 EIGENVALUES = np.array([1.875104068711961, 4.694091132974175, 7.854757438237613, 10.995540734875467])
 
 
@@ -30,7 +30,7 @@ def damped(modes: int, ratio: float = 0.7) -> dict[str, float]:
 
 
 def refusal(parameters: Mapping[str, float], version: str = "3.0") -> str:
-    """Return the one message with which initialization is refused."""
+    """Return the single message of a refused initialization."""
     with beam(parameters, version=version, initialize=False) as b:
         with pytest.raises(FMICallException, match="ExitInitializationMode"):
             b.initialize()
@@ -39,7 +39,7 @@ def refusal(parameters: Mapping[str, float], version: str = "3.0") -> str:
 
 
 def clamped_free(s: float) -> NDArray[np.float64]:
-    """Return the first four shapes at s in their textbook form, good to about 1e-11 there."""
+    """Return the first four shapes at s in their textbook form, accurate to about 1e-11 there."""
     xi = EIGENVALUES
     sigma = (np.sinh(xi) - np.sin(xi)) / (np.cosh(xi) + np.cos(xi))
     shape: NDArray[np.float64] = np.cosh(xi * s) - np.cos(xi * s) - sigma * (np.sinh(xi * s) - np.sin(xi * s))
@@ -210,7 +210,7 @@ def test_elastic_impacts_keep_the_energy_and_those_by_collocation_do_not() -> No
 
 
 def collocated_rule(restitution: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the rule of three clamped-free modes, grid 1/3, 2/3, 1, and the state whose energy it raises most."""
+    """Return the rule of three clamped-free modes, grid 1/3, 2/3, 1, and the state with the largest gain of energy."""
     shapes = np.array([clamped_free(s)[:3] for s in (1 / 3, 2 / 3, 1.0)])
     direction = np.linalg.solve(shapes, [0.0, 0.0, 1.0])
     rule = np.eye(3) - (1.0 + restitution) * np.outer(direction, shapes[2])
@@ -260,7 +260,7 @@ def test_unforced_beams_of_all_kinds_lose_energy_to_every_law_of_contact(boundar
     with beam({**start, **contact, **damping, "record.energies": True}) as b:
         first = energy(b)
         b.advance(0.2)
-        while b.get("contact[1].force") > 0.0:  # what is stored in a stop is not the beam's
+        while b.get("contact[1].force") > 0.0:  # energy stored in a stop does not belong to the beam
             b.step(1e-4)
         assert b.get("contact[1].count") > 3
         lost = b.get("energy.damping_loss") + b.get("energy.contact_loss")
@@ -269,11 +269,11 @@ def test_unforced_beams_of_all_kinds_lose_energy_to_every_law_of_contact(boundar
 
 
 def test_modal_energies_are_only_worked_out_when_asked_for() -> None:
-    for asked in (False, True):
-        with beam({**STRUCK, "record.energies": asked}) as b:
+    for recorded in (False, True):
+        with beam({**STRUCK, "record.energies": recorded}) as b:
             b.step(0.01)
             total = b.get_each("modal_energy[{}]", 4).sum()
-            assert total == pytest.approx(energy(b) if asked else 0.0, rel=SEQUENCE)
+            assert total == pytest.approx(energy(b) if recorded else 0.0, rel=SEQUENCE)
 
 
 # ---- warnings ----
@@ -282,7 +282,7 @@ def test_modal_energies_are_only_worked_out_when_asked_for() -> None:
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_first_mode_outside_euler_bernoullis_theory_is_named(version: str) -> None:
     j = np.arange(1, 41)
-    xi = (j - 0.5) * np.pi  # to 1e-3 and better from mode 3
+    xi = (j - 0.5) * np.pi  # accurate to 1e-3 or better from mode 3 on
     error = 50.0 * (xi * 0.002 / math.sqrt(12.0) / LENGTH) ** 2 * (1.0 + 2.6 * 1.2)
     first = int(j[error > 2.0][0])
     with beam({"modes": 40}, version=version) as b:

@@ -1,4 +1,4 @@
-"""What the FMU of every body does in any tool: FMPy alone, misuse, bad parameters, answered impacts, saved states."""
+"""Common behaviour of all bodies' FMUs: FMPy alone, misuse, bad parameters, answered impacts, saved states."""
 
 import ctypes
 import math
@@ -60,7 +60,7 @@ def test_a_stock_importer_runs_it_alone_at_any_interval(
         assert result["contact[1].count"][-1] == count
         assert abs(result["contact[1].last_time"][-1] - last) <= PARTITION
         assert abs(result["displacement"][-1] - end) <= PARTITION
-        # on its stop a beam is to rounding, as a sum of its modes
+        # a beam is on its stop only up to rounding, as a sum of its modes
         assert result["displacement"].max() <= body.position * (1.0 + (ORBIT if body is BEAM else 0.0))
 
 
@@ -129,7 +129,7 @@ def test_a_bad_parameter_ends_initialization_with_one_message_that_names_it(
         assert f"{name}: expected" in text
         assert rule in text
         assert f"got {value:g}" in text
-        # it is not lost: it can be set right, and started
+        # the instance survives: correct values can be set, and it can be started
         b.set(name, body.scene.get(name, b.start_values()[name]))
         b.fmu.exitInitializationMode()
         b.step(body.end)
@@ -208,7 +208,7 @@ def test_a_step_past_the_stop_time_is_an_error_and_one_up_to_it_is_none(
             b.step(0.2)
         assert "expected a step that ends by the stop time 1 s, got one from 0.9" in b.messages[-1]
         for _ in range(10):
-            b.step(0.01)  # their sum is above .1, by rounding
+            b.step(0.01)  # the sum of these steps is above .1, by rounding
         assert b.time >= 1.0
 
 
@@ -221,7 +221,7 @@ def test_a_stop_time_before_the_start_time_is_refused(body: BodyScene, version: 
         with pytest.raises(FMICallException):
             setup(startTime=3.0, stopTime=stop)
         assert "expected a stop time that is not before the start time 3 s, got" in b.messages[-1]
-        setup(startTime=3.0, stopTime=3.0)  # the instance is as it was, and a run may be of no length
+        setup(startTime=3.0, stopTime=3.0)  # the instance is unchanged, and a run of length 0 is allowed
 
 
 @each_body
@@ -400,7 +400,7 @@ def test_an_external_law_without_event_mode_is_refused_with_what_to_do(
 @each_body
 def test_an_answered_external_law_is_the_restitution_law(body: BodyScene) -> None:
     with body.fmu(body.coupled, event_mode=True) as b, body.fmu() as fused:
-        # later a beam chatters, where the last digits of a velocity decide
+        # later a beam chatters, and the last digits of a velocity decide
         for _ in range(60 if body is OSCILLATOR else 12):
             b.advance_to_event()
             assert b.get("contact[1].event_time") == pytest.approx(b.time, abs=0.0)

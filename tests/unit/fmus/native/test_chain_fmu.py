@@ -12,7 +12,7 @@ from support.component_fmu import EXTERNAL, KELVIN_VOIGT, LOWER, VERSIONS, Compo
 from support.reference_bodies import chain_matrix
 from support.tolerance import ORBIT, PARTITION, ROUNDING, SEQUENCE
 
-#: Issue's reference: thesis chapter 6, two unit masses, force on the first, stop on the second.
+#: Reference: thesis chapter 6, two unit masses, force on the first, stop on the second.
 TWO = {"masses": 2, "damping[1]": 0.1, "damping[2]": 0.1, "forcing.amplitude[1]": 0.5}
 SCENE = {**TWO, "forcing.angular_frequency": 0.9, **stop(0.1)}
 
@@ -22,7 +22,7 @@ def chain(parameters: Mapping[str, float] = {}, **options: Any) -> ComponentFmu:
 
 
 def refusal(parameters: Mapping[str, float], version: str = "3.0") -> str:
-    """Return the one message with which initialization is refused."""
+    """Return the single message of a refused initialization."""
     with chain(parameters, version=version, initialize=False) as c:
         with pytest.raises(FMICallException, match="ExitInitializationMode"):
             c.initialize()
@@ -103,7 +103,7 @@ def test_free_masses_stay_where_they_are_while_the_base_moves_away() -> None:
     with chain({**each("stiffness", [0.0, 1.0]), "base_acceleration_rate": rate}) as c:
         c.step(2.0)
         assert c.get_each("displacement[{}]", 2) == pytest.approx([-rate * 2.0**3 / 6.0] * 2, abs=SEQUENCE)
-        # absolute: none, also at the end of the slope
+        # absolute acceleration: zero, also at the end of the slope
         assert c.get_each("acceleration[{}]", 2) == pytest.approx([0.0] * 2, abs=SEQUENCE)
 
 
@@ -140,7 +140,7 @@ def test_the_thesis_chain_settles_on_its_orbit_of_one_impact(version: str) -> No
     with chain(SCENE, version=version) as c:
         for k in range(1, 301):
             c.step(k * 10.0 - c.time)
-        # reference of the issue
+        # reference value of the issue
         assert c.get("contact[1].last_velocity") == pytest.approx(0.787660852554797, abs=ORBIT)
         loss = (1.0 - 0.7**2) / 2.0 * c.get("contact[1].last_velocity") ** 2
         assert loss == pytest.approx(0.158204452755, abs=1e-12)
@@ -201,7 +201,7 @@ def test_energies_balance_and_are_only_followed_when_asked_for() -> None:
 
 
 def test_a_chain_with_fewer_modes_moves_in_those_alone() -> None:
-    # two equal masses between equal springs with a free end: the slow mode alone, from a start that both take part in
+    # two equal masses between equal springs with a free end: the slow mode alone, from a start with both modes
     golden = (math.sqrt(5.0) - 1.0) / 2.0  # its frequency, and x_1 / x_2 of its shape
     start = np.array([0.3, 0.1])
     shape = np.array([golden, 1.0]) / math.hypot(golden, 1.0)

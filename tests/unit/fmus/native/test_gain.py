@@ -1,4 +1,4 @@
-"""The Gain FMU: a number times a signal, at once, in both versions of FMI."""
+"""The Gain FMU: a number times a signal, without delay, in both versions of FMI."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ CELL = {
 
 
 def followed(fmu: ComponentFmu, times: Array, inputs: Mapping[str, Array], output: str = "output") -> Array:
-    """Return an output at the ends of steps, each with the inputs of its end."""
+    """Return an output at the ends of steps; each step has the inputs of its end."""
     found = []
     for k, time in enumerate(times):
         for name, values in inputs.items():
@@ -37,7 +37,7 @@ def followed(fmu: ComponentFmu, times: Array, inputs: Mapping[str, Array], outpu
 
 
 def contact_signals() -> tuple[Array, dict[str, Array], Array, Array]:
-    """Return instants, a force and impacts as a body gives them, and the impacts one by one."""
+    """Return instants, a force and impacts as a body outputs them, and a list of the impacts."""
     times = np.sort(np.concatenate([np.arange(60) * 1e-3, 0.03 * np.arange(1, 40) / 41.0]))
     forces = 5.0 * np.maximum(0.0, np.sin(150.0 * times))
     hits, impulses = np.array([4.3e-3, 5.1e-3, 21.0e-3, 40.4e-3]), np.array([2e-3, 1e-3, 3e-3, 5e-4])
@@ -61,7 +61,7 @@ def test_a_load_cell_says_what_the_door_says(version: str, natural: float) -> No
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_load_cell_goes_back_to_a_saved_state_with_its_half_sines(version: str) -> None:
     times, inputs, _, _ = contact_signals()
-    half = int(np.searchsorted(times, 5.5e-3))  # two half sines are under way
+    half = int(np.searchsorted(times, 5.5e-3))  # during two half sines
     rest = {name: values[half:] for name, values in inputs.items()}
     with ComponentFmu("LoadCell", CELL, version=version) as fmu:
         followed(fmu, times[:half], {name: values[:half] for name, values in inputs.items()})
@@ -185,7 +185,7 @@ def test_an_analog_input_without_events_samples_the_input_of_its_step(version: s
         found = followed(fmu, times, {"input": values})
         assert fmu.get("sample") == 20
     edges = np.arange(21) / 1050.0 + 2e-4
-    step = np.searchsorted(times, edges - 1e-12)  # the first end that is not before the edge
+    step = np.searchsorted(times, edges - 1e-12)  # the first end at or after the edge
     held = np.concatenate([[0.0], digitised(values, 5.0, 8)[step]])
     assert np.array_equal(found, held[np.searchsorted(edges, times + 1e-12, side="right")])
 
@@ -200,7 +200,7 @@ def test_an_edge_at_the_start_is_the_first_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("component", "parameters", "said"),
+    ("component", "parameters", "message"),
     [
         ("Sensor", {"gain": math.nan}, "gain: expected a finite number, got"),
         ("Sensor", {"range": -1.0}, "range: expected a finite number >= 0, got -1"),
@@ -217,13 +217,13 @@ def test_an_edge_at_the_start_is_the_first_sample() -> None:
 )  # fmt: skip
 @pytest.mark.parametrize("version", VERSIONS)
 def test_parameters_that_mean_nothing_are_refused_by_name(
-    component: str, parameters: dict[str, float], said: str, version: str
+    component: str, parameters: dict[str, float], message: str, version: str
 ) -> None:
     fmu = ComponentFmu(component, parameters, version=version, initialize=False)
     try:
         with pytest.raises(Exception, match="Initialization"):
             fmu.initialize()
-        assert said in fmu.messages[-1]
+        assert message in fmu.messages[-1]
     finally:
         fmu.free()
 

@@ -1,4 +1,4 @@
-"""Model exchange: FMPy's CVode integrates our bodies, and finds what co-simulation has found exactly."""
+"""Model exchange: FMPy's CVode integrates our bodies, and finds the exact results of co-simulation."""
 
 import math
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ def simulate(
 
 
 def impacts(result: Any) -> tuple[Any, Any]:
-    """Return times and speeds of the impacts at contact 1, each recorded after it."""
+    """Return times and speeds of the impacts at contact 1, each recorded after the impact."""
     after = np.flatnonzero(np.diff(result["contact[1].count"])) + 1
     return result["contact[1].last_time"][after], result["contact[1].last_velocity"][after]
 
@@ -171,7 +171,7 @@ def test_the_motion_is_that_of_co_simulation(scene: str, version: str) -> None:
     assert exact["contact[1].count"][-1] > 0
 
 
-#: The force presses the mass against its stop for a part of each period.
+#: The force presses the mass against its stop during a part of each period.
 PRESSED = {**DRIVEN, "forcing.angular_frequency": 0.3, **stop(law=RESTITUTION, restitution=0.7, position=0.0)}
 
 
@@ -273,14 +273,14 @@ def test_states_that_are_not_finite_are_discarded_so_that_an_integrator_halves_i
     it.begin()
     it.move(0.1, *states)
     calls = {"derivatives": lambda: it.derivatives(2)}
-    if not np.isfinite(states).all():  # 1e300 has an indicator, and an acceleration beyond all numbers
+    if not np.isfinite(states).all():  # 1e300 has an indicator, and an infinite acceleration
         calls["indicators"] = lambda: it.numbers("getEventIndicators", 2)
     for call in calls.values():
         with pytest.raises(FMICallException) as caught:
             call()
         assert caught.value.status == DISCARD
         assert "Try a shorter step" in it.messages[-1]
-    # the instance is as it was: the shorter step is taken
+    # the instance is unchanged: it takes the shorter step
     it.move(0.05, 0.1, 0.2)
     assert it.derivatives(2) == pytest.approx([0.2, -1e19])
     assert it.numbers("getEventIndicators", 2)[0] == pytest.approx(0.9)

@@ -1,4 +1,4 @@
-"""The Oscillator FMU beyond what all bodies do (test_body_fmus.py): its orbit, chatter and release when answered."""
+"""The Oscillator FMU beyond test_body_fmus.py: its orbit, chatter, and release when answered."""
 
 import math
 
@@ -52,7 +52,7 @@ def test_in_fmi_2_a_contact_is_announced_stepped_back_to_and_answered() -> None:
                 if not math.isnan(event):
                     break
             with pytest.raises(FMICallException):
-                o.step(0.5)  # it has passed through the stop: only back is right
+                o.step(0.5)  # it has passed through the stop: only a return is valid
             o.restore(saved)
             o.time = before
             if event > before:
@@ -70,7 +70,7 @@ def test_the_outputs_follow_an_input_set_between_steps() -> None:
         o.set("force", 2.0)
         assert o.get("acceleration") == 1.5
         o.set("base_acceleration", 1.0)
-        # absolute: the relative one is 2 - .5 - 1
+        # absolute acceleration: the relative one is 2 - .5 - 1
         assert abs(o.get("acceleration") - 1.5) <= ROUNDING
 
 

@@ -66,7 +66,7 @@ def opened(fmu: Path) -> Iterator[Callable[..., Player]]:
         player.free()
 
 
-# What it plays.
+# Playback.
 
 
 @pytest.mark.parametrize(
@@ -92,12 +92,12 @@ def test_between_samples_value_and_slope_are_those_of_the_straight_line(opened, 
 def test_steps_of_the_sampling_interval_find_every_sample_and_the_slope_that_begins_there(  # type: ignore[no-untyped-def]
     opened, name, start
 ) -> None:
-    # times are summed, so that they come to lie a little before and after the samples' own
+    # summed times lie a little before and after the instants of the samples
     player, values = opened(start=start), np.asarray(SIGNALS[name].values)
     before = 0
     for index in range(COUNT - 1):
         value, rate, valid = player.now(name)
-        # the sum of the steps drifts away from the samples by some 1e-5 of a step
+        # the sum of the steps drifts from the samples by about 1e-5 of a step
         assert value == pytest.approx(
             values[index], abs=abs(player.time - start - index * INTERVAL) * STEEPEST + 1e-14
         )
@@ -180,7 +180,7 @@ def test_a_state_is_its_time_and_its_parameters_and_another_instance_goes_on_fro
     one = opened(base_gain=3.0)
     kept = one.at("base", 20.25 * INTERVAL)
     state = one.serialized()
-    assert len(state) < 400  # of 4 channels of 600 samples
+    assert len(state) < 400  # for 4 channels of 600 samples
     assert one.at("base", 90.5 * INTERVAL) != kept
     one.restore(state)
     assert one.now("base") == kept
@@ -226,7 +226,7 @@ def test_fmpy_simulates_it_alone(fmu: Path) -> None:
     assert result["base_valid"][:300].all()
 
 
-# One process, several of them.
+# Several instances in one process.
 
 
 def test_two_records_in_one_process_keep_apart(opened, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
@@ -236,13 +236,13 @@ def test_two_records_in_one_process_keep_apart(opened, tmp_path: Path) -> None: 
     assert one.at("base", 30 * INTERVAL)[0] == pytest.approx(values[30])
     assert two.at("base", 0.05) == (pytest.approx(5.25), pytest.approx(5.0), True)
     assert again.at("base", 40 * INTERVAL)[0] == pytest.approx(values[40])
-    # what one instance is asked leaves the others where they are
+    # requests to one instance leave the others unchanged
     assert one.now("base")[0] == pytest.approx(values[30])
     assert two.now("base")[0] == pytest.approx(5.25)
 
 
 def changed(fmu: Path, target: Path, files: dict[str, bytes | None]) -> Path:
-    """Write an FMU with other signal files; None takes one out."""
+    """Write an FMU with other signal files; None removes a file."""
     with zipfile.ZipFile(fmu) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     for name, content in files.items():
@@ -271,7 +271,7 @@ def test_equal_signals_make_equal_files_and_others_another_token(tmp_path: Path)
     assert len(tokens) == 2
 
 
-# What it says of itself.
+# Description of the FMU.
 
 
 def test_the_description_is_valid_and_says_what_importers_need(fmu: Path) -> None:
@@ -309,7 +309,7 @@ def test_the_description_is_valid_and_says_what_importers_need(fmu: Path) -> Non
     assert float(experiment.stopTime) == pytest.approx(DAY + (COUNT - 1) * INTERVAL)
 
 
-# What it refuses.
+# Refusals.
 
 GOOD = [0.0, 1.0, 2.0]
 
@@ -411,8 +411,8 @@ def test_damaged_signal_files_are_refused_by_name(
 
     with pytest.raises(Exception, match=r"nstanti|fmi3ExitInitializationMode"):
         Failing(changed(pair, tmp_path / "x.fmu", damage)).free()
-    (told,) = messages
-    assert message in told
+    (text,) = messages
+    assert message in text
 
 
 def test_the_component_without_a_recording_says_how_to_make_one(tmp_path: Path) -> None:
@@ -461,8 +461,8 @@ def test_the_command_makes_an_fmu_in_si_units(
 ) -> None:
     source = recording(tmp_path)
     assert exit_code("fmu", "replay", source, "--channel", "base", "--si", "-o", tmp_path / "a.fmu") == 0
-    assert "base: 50 samples in m s-2" in (told := capsys.readouterr().out)
-    assert "2 missing" in told
+    assert "base: 50 samples in m s-2" in (text := capsys.readouterr().out)
+    assert "2 missing" in text
     variables = {v.name: v.unit for v in read_description(tmp_path / "a.fmu").modelVariables}
     assert variables["base"] == "m/s2"
     assert not [name for name in variables if name.startswith("board")]

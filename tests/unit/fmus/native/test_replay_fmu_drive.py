@@ -35,7 +35,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 BODY = {"mass": 1.0, "stiffness": 250.0**2, "damping": 2.0 * 0.02 * 250.0}
-#: The jump of the record throws it against this stop.
+#: Position and restitution of the stop that the jump of the record throws the body against, m and 1.
 PLACE, RESTITUTION = -4e-4, 0.7
 STOPPED = BODY | {
     "contact[1].law": "restitution",
@@ -48,13 +48,13 @@ STOPPED = BODY | {
 def driven(
     fmu: Path, version: str, parameters: Mapping[str, float | str], exchange: str = "gauss_seidel"
 ) -> Importer:
-    """Return an oscillator whose base the channel `base` moves."""
+    """Return an oscillator with a base moved by the channel `base`."""
     body = ComponentSpec("body", fmu_path("Oscillator", version), parameters)
     joined = [
         ConnectionSpec(("record", "base"), ("body", "base_acceleration")),
         ConnectionSpec(("record", "base_rate"), ("body", "base_acceleration_rate")),
     ]
-    # declared first, and yet stepped last: it gives an input its slope
+    # declared first, but stepped last, since it gives an input its slope
     return Importer([ComponentSpec("record", fmu), body], joined, exchange=exchange, macro_step=INTERVAL)
 
 
@@ -102,7 +102,7 @@ def test_impacts_between_samples_do_not_disturb_the_drive(fmu: Path, version) ->
 
 
 def test_a_stop_that_is_an_fmu_ends_steps_between_samples_and_changes_nothing(fmu: Path) -> None:
-    # equivalence: the stop inside the body, and beside it with events that end the steps of all
+    # equivalence: the stop inside the body, and as a separate component whose events end all steps
     fused = followed(driven(fmu, "3.0", STOPPED), COUNT)
     joined = [
         *(ConnectionSpec(("record", f"base{e}"), ("body", f"base_acceleration{e}")) for e in ("", "_rate")),

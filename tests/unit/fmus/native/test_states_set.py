@@ -1,4 +1,4 @@
-"""States of model exchange may be set one by one: CasADi and PyFMI make their Jacobians so."""
+"""States of model exchange can be set one by one: CasADi and PyFMI compute their Jacobians this way."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def states_of(it: Integrated) -> list[str]:
 
 
 def jacobian(it: Integrated, states: NDArray[np.float64], move: Callable[[int, float], None]) -> NDArray[Any]:
-    """Return the derivatives of the derivatives by differences; `move` gives one state another value."""
+    """Return the Jacobian of the derivatives by differences; `move` sets one state to another value."""
     columns = []
     for place, value in enumerate(states):
         found = []
@@ -119,7 +119,7 @@ def test_no_variable_is_a_state_and_the_derivative_of_another(component: str, ve
     assert len(derivatives) == len(states) == len({*derivatives, *states}) // 2
     half = len(states) // 2
     assert all(name == f"der({state})" for name, state in zip(derivatives[:half], states, strict=False))
-    # displacements first, then velocities, in one order
+    # displacements first, then velocities, in the same order
     assert [name.replace("displacement", "velocity") for name in states[:half]] == states[half:]
     causalities = {v.name: v.causality for v in it.description.modelVariables}
     assert {causalities[name] for name in derivatives} == {"local"}

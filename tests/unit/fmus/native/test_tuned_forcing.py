@@ -1,4 +1,4 @@
-"""Forcing that is tuned while a body moves: phase, motion and time go on. References: a body that starts there."""
+"""Forcing tuned during a motion: phase, motion and time continue. Reference: a body that starts from that state."""
 
 import math
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ BEAM = {
     **stop(0.0006),
 }
 BASE = {"forcing.base_acceleration": -0.3}
-#: Component, parameters, amplitude that is tuned, time of a radian, displacements and velocities at the start and now.
+#: Component, parameters, tuned amplitude, time of a radian, displacements and velocities at the start and now.
 BODIES = [
     pytest.param(
         "Oscillator", OSCILLATOR, "forcing.amplitude", 1.0, ("displacement", "velocity"), id="rigid"
@@ -72,7 +72,7 @@ BODIES = [
 
 
 def begin_again(body: ComponentFmu, names: tuple[str, str]) -> dict[str, float]:
-    """Return start values at which a body of its kind is where this one is."""
+    """Return start values for a body of the same kind in the present state of this body."""
     found = {}
     for name in names:
         count = {"Chain": 2, "Beam": 3}.get(body.path.stem, 1)
@@ -121,11 +121,11 @@ def test_a_tuned_body_moves_on_as_one_that_starts_there_at_the_phase_of_then(
 def test_time_and_phase_stay_right_over_thousands_of_frequencies() -> None:
     draw = np.random.default_rng(3)
     phase, time, w = 0.7, 0.0, 1.0
-    # nothing moves it but the force: what the force is, the acceleration of a mass at rest shows
+    # only the force acts: the acceleration of a heavy mass at rest shows the force
     parameters = {"stiffness": 0.0, "mass": 1e9, "forcing.amplitude": 1e9, "forcing.phase": phase}
     with OscillatorFmu({**parameters, "forcing.angular_frequency": w}) as body:
         for _ in range(3000):
-            size = float(draw.integers(2**10, 2**24)) / 2.0**20  # sums of these are exact
+            size = float(draw.integers(2**10, 2**24)) / 2.0**20  # sums of these numbers are exact
             phase, time = math.remainder(phase + w * size, 2.0 * math.pi), time + size
             body.advance(time)
             assert body.get("acceleration") == pytest.approx(math.cos(phase), abs=1e-11)
@@ -184,7 +184,7 @@ MOVING = (
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("component", ["Oscillator", "Chain", "Beam"])
 @pytest.mark.parametrize(
-    ("frequency", "name", "value", "said"),
+    ("frequency", "name", "value", "message"),
     [
         (1.0, "forcing.angular_frequency", 0.0, MOVING + "0"),
         (1.0, "forcing.angular_frequency", -1.0, MOVING + "-1"),
@@ -201,7 +201,7 @@ MOVING = (
     ],
 )
 def test_a_forcing_that_no_body_can_go_on_with_is_refused(
-    component: str, frequency: float, name: str, value: float, said: str, version: str
+    component: str, frequency: float, name: str, value: float, message: str, version: str
 ) -> None:
     index = "[1]" if component == "Chain" else ""
     name = name + index if name.endswith("amplitude") else name
@@ -211,23 +211,23 @@ def test_a_forcing_that_no_body_can_go_on_with_is_refused(
         body.set(name, value)
         with pytest.raises(FMICallException):
             body.step(0.1)
-        assert said.format(index) in body.messages[-1]
+        assert message.format(index) in body.messages[-1]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("component", ["Oscillator", "Chain"])
 def test_a_base_that_is_no_number_is_refused_at_the_start_and_later(component: str, version: str) -> None:
-    said = "forcing.base_acceleration: expected a finite number, got inf"
+    message = "forcing.base_acceleration: expected a finite number, got inf"
     with ComponentFmu(component, {"forcing.angular_frequency": 1.0}, version=version) as body:
         body.set("forcing.base_acceleration", math.inf)
         with pytest.raises(FMICallException):
             body.step(0.1)
-        assert said in body.messages[-1]
+        assert message in body.messages[-1]
     base = {"forcing.base_acceleration": math.inf}
     with ComponentFmu(component, base, version=version, initialize=False) as body:
         with pytest.raises(FMICallException):
             body.initialize()
-        assert said in body.messages[-1]
+        assert message in body.messages[-1]
 
 
 def test_a_base_shaken_at_a_phase_carries_a_free_mass_along() -> None:
@@ -236,7 +236,7 @@ def test_a_base_shaken_at_a_phase_carries_a_free_mass_along() -> None:
         for time in (0.0, 0.3, 1.7, 9.0):
             if time:
                 body.advance(time)
-            # the force is all that the mass feels
+            # only the force acts on the mass
             assert body.get("acceleration") == pytest.approx(0.5 * math.cos(3.0 * time + 0.4), abs=1e-14)
             relative = (0.5 - 2.0) * math.cos(3.0 * time + 0.4)
             assert body.get("relative_acceleration") == pytest.approx(relative, abs=1e-14)

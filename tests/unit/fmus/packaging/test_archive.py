@@ -430,7 +430,7 @@ def test_what_a_killed_process_left_is_swept(
 def test_a_description_above_16_mib_is_refused_before_a_parser_sees_it(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """A comment of 300 MB in an archive of 300 kB took minutes: expat 2.5 is quadratic in a long token."""
+    """A comment of 300 MB in an archive of 300 kB took minutes: expat 2.5 is quadratic in the length of a token."""
     monkeypatch.setattr(archive, "root_of", None)
     content = DESCRIPTION.encode() + b"<!--" + b"a" * LARGEST_XML + b"-->"
     path = tmp_path / "M.fmu"

@@ -1,4 +1,4 @@
-"""Building: which compiler is taken, what a failure says, and that nothing but the sources matters."""
+"""Building: choice of the compiler, messages of failures, and dependence on the sources alone."""
 
 import ctypes
 import shutil
@@ -30,7 +30,7 @@ def sources(tmp_path: Path) -> Path:
 
 
 def keep_one_component(sources: Path) -> None:
-    """Leave the Sensor and its part of the core in a copy of the sources: all of it takes twenty times as long."""
+    """Reduce a copy of the sources to the Sensor and its part of the core: all sources take twenty times as long."""
     for description in sources.glob("*/variables.toml"):
         if description.parent.name != "sensor":
             shutil.rmtree(description.parent)
@@ -59,7 +59,7 @@ def test_an_error_in_the_c_is_told_in_the_compilers_words(sources: Path, tmp_pat
     (sources / "core" / "zz_wrong.c").write_text("int wrong(void) { return undeclared_name; }\n")
     with pytest.raises(ComponentError, match="undeclared_name"):
         build(tmp_path / "built", native=sources)
-    # a build that failed is not taken for a good one
+    # a failed build does not count as current
     assert not is_current(tmp_path / "built", native=sources)
 
 

@@ -1,4 +1,4 @@
-"""`fmu check` finds what a validator of the description alone does not."""
+"""`fmu check` finds faults that a validator of the description alone misses."""
 
 import re
 import zipfile
@@ -69,7 +69,7 @@ def test_a_misspelt_capability_is_found_though_the_schema_lets_it_pass(tmp_path:
     [
         *(("a.b[2,31].c_1", True), ("_x", True), ("der(x)", True), ("'any thing'", True)),
         *(("any thing", False), ("a[1", False), ("a[]", False), ("1a", False), ("a..b", False), ("ä", False)),
-        ("output", False),  # twice
+        ("output", False),  # listed twice
     ],
 )
 def test_names_are_judged_as_by_fmpy(tmp_path: Path, name: str, is_legal: bool) -> None:
@@ -114,7 +114,7 @@ def test_a_function_that_does_not_resolve_is_found(tmp_path: Path) -> None:
 
     problems = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
     assert "got none called fmi3GetShiftDecimal" in problems[0].text
-    assert {one.grade for one in problems} == {Grade.remark}  # no run calls it but of an FMU with clocks
+    assert {one.grade for one in problems} == {Grade.remark}  # runs call it only for FMUs with clocks
 
 
 def test_a_function_that_each_run_calls_is_a_refusal(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""FMUs for several machines: which libraries are taken, where they lie, and what is said where there are none."""
+"""FMUs for several machines: choice and place of the libraries, and messages when there are none."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FOLDERS = {
 
 @pytest.fixture
 def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Pretend that the package brings libraries along: what they hold does not matter here."""
+    """Pretend that the package contains libraries; their contents do not matter here."""
     folder = tmp_path / "platforms"
     for name in TARGETS:
         (folder / name).mkdir(parents=True)
@@ -50,8 +50,8 @@ def test_an_export_has_the_libraries_of_the_platforms_asked_for(
     path = export_fmu("oscillator", tmp_path / "x.fmu", fmi=fmi, platform=names)
     with zipfile.ZipFile(path) as archive:
         folders = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
-    wanted = [platform.name for platform in chosen_platforms(names)]
-    assert folders == set().union(*(FOLDERS[fmi][name] for name in wanted))
+    chosen = [platform.name for platform in chosen_platforms(names)]
+    assert folders == set().union(*(FOLDERS[fmi][name] for name in chosen))
 
 
 def test_a_release_makes_exports_for_all_platforms(tmp_path: Path, release: Path) -> None:
@@ -101,11 +101,11 @@ def test_zig_compiles_a_library_for_each_platform_and_it_is_kept(
 ) -> None:
     monkeypatch.setenv("VIBROIMPACT_CACHE", str(tmp_path / "cache"))
     stop = next(c for c in read_components() if c.name == "ImpactStop")
-    said: list[str] = []
-    library = library_for(stop, Platform(name), said.append)
-    assert said == [f"{name}: compiling ImpactStop"]
-    assert library_for(stop, Platform(name), said.append) == library
-    assert len(said) == 1
+    notes: list[str] = []
+    library = library_for(stop, Platform(name), notes.append)
+    assert notes == [f"{name}: compiling ImpactStop"]
+    assert library_for(stop, Platform(name), notes.append) == library
+    assert len(notes) == 1
     starts = {"linux": b"\x7fELF", "windows": b"MZ", "darwin": b"\xcf\xfa\xed\xfe"}
     assert library.startswith(starts[Platform(name).system])
     assert b"fmi3DoStep" in library

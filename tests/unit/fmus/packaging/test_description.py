@@ -1,4 +1,4 @@
-"""One variables.toml makes the two descriptions, the C header and the README's table."""
+"""One variables.toml generates the two descriptions, the C header and the README's table."""
 
 import subprocess
 from pathlib import Path
@@ -162,7 +162,7 @@ def test_value_references_count_through_the_file_block_by_block(small: Component
 def test_fmpy_finds_nothing_wrong_with_either_version(
     small: ComponentDescription, tmp_path: Path, contacts: int, fmi: str
 ) -> None:
-    # the names of `small` stand for all: FMPy parses one in a hundredth of a second
+    # the names in `small` represent all names: FMPy parses one in a hundredth of a second
     for component in (small, *read_components()):
         repeats = {block: 2 for block in component.repeats} | {"contact": contacts}
         text = model_description(component.with_repeats(repeats), fmi)
@@ -296,7 +296,7 @@ dependencies = ["load[{*}]", "push", "pull"]
 
 @pytest.fixture
 def joined(tmp_path: Path) -> ComponentDescription:
-    """Return the small component with what it has in common with others."""
+    """Return the small component with the content that it shares with others."""
     (tmp_path / "core").mkdir()
     (tmp_path / "core" / "common.toml").write_text(COMMON, encoding="utf-8")
     (tmp_path / "small").mkdir()
@@ -325,7 +325,7 @@ def test_an_included_file_is_part_of_the_token(joined: ComponentDescription) -> 
 
 def test_a_dependency_may_stand_for_a_whole_block(joined: ComponentDescription) -> None:
     answer = next(v for v in joined.with_repeats({"mode": 2}).variables if v.name == "answer[2]")
-    # and one that this component does not have is left out
+    # dependencies that this component lacks are left out
     assert joined.with_repeats({"mode": 2}).direct_inputs(answer, 3) == ("load[1]", "load[2]", "push")
 
 

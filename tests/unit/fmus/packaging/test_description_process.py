@@ -1,4 +1,4 @@
-"""Descriptions of foreign FMUs are read by a process of their own, once for each content."""
+"""A separate process reads the descriptions of foreign FMUs, once for each content."""
 
 import re
 import shutil
@@ -62,8 +62,8 @@ def test_a_parser_gets_a_description_whole() -> None:
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return the readers of files that the other process is asked for from now on."""
+def readers(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the list of readers that the other process is asked for from now on."""
     readers = []
     original = archive.read_apart
 
@@ -76,29 +76,29 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_a_foreign_description_is_read_by_a_process_of_its_own_once(
-    path: Path, tmp_path: Path, asked: list[str]
+    path: Path, tmp_path: Path, readers: list[str]
 ) -> None:
     for _ in range(2):
         unpack(path)
         read_description(path)
-    assert asked == ["vibroimpact.fmus.packaging.description_check:read"]
+    assert readers == ["vibroimpact.fmus.packaging.description_check:read"]
     unpack(path.rename(tmp_path / "renamed.fmu"))
-    assert len(asked) == 1
+    assert len(readers) == 1
 
 
-def test_components_of_the_package_are_known_by_their_content(tmp_path: Path, asked: list[str]) -> None:
+def test_components_of_the_package_are_known_by_their_content(tmp_path: Path, readers: list[str]) -> None:
     copy = tmp_path / "renamed.fmu"
     shutil.copy(fmu_path("Oscillator"), copy)
     unpack(copy)
-    assert asked == []
+    assert readers == []
     with zipfile.ZipFile(copy, "a") as file:
         file.writestr("more.txt", "changed")
     unpack(copy)
-    assert len(asked) == 1
+    assert len(readers) == 1
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("answer", "expected"),
     [
         (Answer("late"), "expected XML that can be read, got one that the library had not read after 10 s"),
         (Answer("died", error="11"), r"got one that crashes the library which reads it \(SIGSEGV\)"),
@@ -106,12 +106,12 @@ def test_components_of_the_package_are_known_by_their_content(tmp_path: Path, as
     ],
 )
 def test_a_description_that_its_reader_does_not_survive_is_refused_and_not_kept(
-    path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, answer: Answer, said: str
+    path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, answer: Answer, expected: str
 ) -> None:
     monkeypatch.setattr(archive, "read_apart", lambda order: answer)
     with pytest.raises(ComponentFileError) as refused:
         unpack(path)
     message = str(refused.value)
     assert message.startswith(f"{path}: modelDescription.xml: ")
-    assert re.search(said, message)
+    assert re.search(expected, message)
     assert [folder for folder in (cache / "fmus").iterdir() if folder.is_dir()] == []

@@ -1,4 +1,4 @@
-"""Exports have just the contacts, modes, masses and sensors asked for, and their binary knows it."""
+"""Exports have exactly the requested contacts, modes, masses and sensors, and their binary uses these numbers."""
 
 import zipfile
 from ctypes import byref
@@ -125,7 +125,7 @@ def test_the_command_line_exports_a_beam_and_a_chain(tmp_path: Path) -> None:
 
 
 def modes_for(fmu: UnpackedFmu, location: bytes | None) -> Any:
-    """Return the start value of `modes` of an FMI 2.0 instance that is told this resource location."""
+    """Return the start value of `modes` of an FMI 2.0 instance with this resource location."""
     slave = FMU2Slave(
         guid=fmu.token, unzipDirectory=str(fmu.folder), modelIdentifier="Beam", instanceName="beam"
     )
@@ -191,7 +191,7 @@ def test_a_damaged_file_of_sizes_does_no_harm(tmp_path: Path, text: bytes, modes
 
 @pytest.mark.parametrize("name", ["oscillator", "chain", "beam", "impact_stop"])
 def test_value_references_of_fmi_3_are_places_in_the_description(tmp_path: Path, name: str) -> None:
-    # OMSimulator takes those in dependencies for places, and refused a chain and a beam
+    # OMSimulator takes references in dependencies for places, and refused a chain and a beam
     path = export_fmu(name, tmp_path / "x.fmu")
     references = [variable.valueReference for variable in read_description(path).modelVariables]
     assert references == list(range(1, len(references) + 1))

@@ -1,4 +1,4 @@
-"""A lean description has nothing that other tools stumbled over, and its binary is the one that it describes."""
+"""A lean description has nothing that other tools failed on, and it describes the unchanged binary."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ POINTS = {
     "LoadCell": ("force", "impulse", "impact_time", "load", "output"),
     "Exciter": ("input", "displacement", "force"),
 }
-"""Components of one plug, and what is in it."""
+"""Components with one terminal, and its members."""
 
 
 def description(path: Path) -> ElementTree.Element:
@@ -92,7 +92,7 @@ def test_every_start_value_lies_in_its_range_and_every_unknown_says_its_knowns(
 
 
 def test_no_displacement_waits_for_an_input_when_a_run_begins(tmp_path: Path) -> None:
-    # else a body and its stop in another tool are an algebraic loop at the start
+    # a dependency would make a body and its stop an algebraic loop at the start in another tool
     for fmi in VERSIONS:
         root = description(export_fmu("oscillator", tmp_path / f"{fmi}.fmu", fmi=fmi, external=True))
         variables = list(root.find("ModelVariables"))  # type: ignore[arg-type]
@@ -169,8 +169,8 @@ def test_start_values_of_an_export_are_those_of_the_description_and_of_the_binar
         for _ in range(2):
             assert {name: fmu.get(name) for name in described} == described
             fmu.fmu.reset()
-    wanted = {**starts, "contact[1].law": 1, "contact[1].side": 2}
-    assert {name: described[name] for name in wanted} == wanted
+    expected = {**starts, "contact[1].law": 1, "contact[1].side": 2}
+    assert {name: described[name] for name in expected} == expected
     assert described["displacement_start"] == 0.0
 
 
@@ -224,7 +224,7 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
         return
     assert "displacement" in plugs["point"]
     if name != "ImpactStop":
-        # a contact and a stop fit together
+        # the terminals of a contact and a stop fit together
         stop = {"displacement", "velocity", "applied_restitution"}
         stop |= {"applied_force", "applied_stiffness", "applied_damping"}
         assert stop <= plugs["contact[1]"].keys()
@@ -234,7 +234,7 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
 
 
 @pytest.mark.parametrize(
-    ("starts", "said"),
+    ("starts", "text"),
     [
         ({"mas": 2.0}, "mas: expected a parameter or an input, got none of this name. Did you mean mass?"),
         ({"mass": -1.0}, "mass: expected a number >= 0, got -1.0."),
@@ -250,15 +250,15 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
         ({"record.impacts": "perhaps"}, "record.impacts: expected true or false, got 'perhaps'."),
     ],
 )
-def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[str, Any], said: str) -> None:
+def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[str, Any], text: str) -> None:
     with pytest.raises(UsageError) as caught:
         export_fmu("oscillator", tmp_path / "o.fmu", starts=starts)
-    assert said in str(caught.value)
+    assert text in str(caught.value)
     assert not (tmp_path / "o.fmu").exists()
 
 
 @pytest.mark.parametrize(
-    ("name", "starts", "said"),
+    ("name", "starts", "message"),
     [
         ("oscillator", {"mass": 0.0}, "Oscillator: mass: expected a finite number > 0, got 0."),
         ("impact_stop", {"law": "hertz"}, "ImpactStop: stiffness: expected a finite number > 0, got 0."),
@@ -268,12 +268,12 @@ def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[st
 )
 @pytest.mark.parametrize("full", [False, True])
 def test_start_values_that_the_library_refuses_are_not_written(
-    tmp_path: Path, name: str, starts: dict[str, Any], said: str, full: bool
+    tmp_path: Path, name: str, starts: dict[str, Any], message: str, full: bool
 ) -> None:
     with pytest.raises(UsageError) as caught:
         export_fmu(name, tmp_path / "x.fmu", starts=starts, full=full)
     (line,) = str(caught.value).splitlines()
-    assert line.startswith(said)
+    assert line.startswith(message)
     assert line.endswith("Nothing was written.")
     assert not list(tmp_path.iterdir())
 

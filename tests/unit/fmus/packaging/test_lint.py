@@ -1,4 +1,4 @@
-"""What tools stumble over that are not here to be tried: every lean description of both versions has none of it."""
+"""Lean descriptions of both versions avoid the known faults of tools that cannot be tried here."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
 STEPS = 200
-#: Stops that are touched at the start, where a force decides whether a body rests.
+#: Stops that the body touches at the start, where a force decides whether it rests.
 TOUCHING = {"contact[1].law": "restitution", "contact[1].restitution": 0.5}
 YIELDING = {"contact[1].law": "kelvin_voigt", "contact[1].stiffness": 10.0}
 
@@ -54,7 +54,7 @@ def test_every_unknown_names_what_it_depends_on_and_only_what_is_there(lean: Pat
 
 
 def test_a_default_run_gives_numbers_and_no_warning(lean: Path) -> None:
-    told: list[tuple[int, str]] = []
+    logged: list[tuple[int, str]] = []
     experiment = read_description(lean).defaultExperiment
     start, step = float(experiment.startTime), float(experiment.stepSize)
     result = simulate_fmu(
@@ -65,10 +65,10 @@ def test_a_default_run_gives_numbers_and_no_warning(lean: Path) -> None:
         step_size=step,
         output_interval=step,
         debug_logging=True,
-        # environment and, in FMI 2.0, the name of the instance come first
-        logger=lambda *arguments: told.append((int(arguments[-3]), str(arguments[-1]))),
+        # environment and, in FMI 2.0, the instance name come first
+        logger=lambda *arguments: logged.append((int(arguments[-3]), str(arguments[-1]))),
     )
-    assert not [text for level, text in told if level >= 1]
+    assert not [text for level, text in logged if level >= 1]
     assert all(np.isfinite(np.asarray(result[name], float)).all() for name in result.dtype.names)
     assert len(result) > 2
 
@@ -88,14 +88,14 @@ def test_an_output_that_follows_an_input_at_the_start_says_so(
     inputs = [v.name for v in variables if v.causality == "input"]
     knowns = {u.variable.name: {k.name for k in u.dependencies} for u in description.initialUnknowns}
 
-    def begun(values: dict[str, float]) -> dict[str, float]:
+    def started(values: dict[str, float]) -> dict[str, float]:
         with ComponentFmu(path, values, version=fmi) as fmu:
             return {output: fmu.get(output) for output in outputs}
 
-    plain, seen = begun({}), 0
+    plain, seen = started({}), 0
     for known in inputs:
         for value in (1.0, -1.0):
-            changed = begun({known: value})
+            changed = started({known: value})
             for output in outputs:
                 if changed[output] != plain[output]:
                     seen += 1

@@ -1,4 +1,4 @@
-"""The FMUs of the test suite do what their README says: valid on paper, each wrong in its own way."""
+"""The FMUs of the test suite behave as their README says: valid by description, each with its own fault."""
 
 import ctypes
 import math
@@ -38,7 +38,7 @@ GRAVITY, RESTITUTION, HEIGHT = 9.81, 0.7, 1.0
 H, V, BOUNCES, LANDING = 1, 2, 6, 5
 U, Y, FAULT, FAULT_TIME = 1, 2, 3, 4
 
-# drives an FMU with FMPy's own classes, in a process that may die or never end
+# drives an FMU with FMPy's own classes, in a process that may die or hang
 DRIVER = """
 import sys
 from fmpy import extract, read_model_description
@@ -274,7 +274,7 @@ def faulty(tmp_path: Path, fmi: str, fault: int) -> tuple[FMU2Slave | FMU3Slave,
         fmu.setInt64([FAULT], [fault])
         initialize_slave(fmu)
     else:
-        # the fifth argument is the format: what follows it is out of Python's reach
+        # the fifth argument is the format: Python cannot read the arguments after it
         logger = fmi2CallbackLoggerTYPE(lambda *a: lines.append(a[4]))
         memory = defaultCallbacks.allocateMemory, defaultCallbacks.freeMemory
         fmu.instantiate(callbacks=fmi2CallbackFunctions(logger, *memory))

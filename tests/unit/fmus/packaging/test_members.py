@@ -1,4 +1,4 @@
-"""What is in an export for the person who uses it: icon, page, reference result; and its token."""
+"""Members of an export for its user: icon, page, reference result; and the token."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.trial import FOLDER, MANIFEST, MOST_INTERVALS, RESULT
 
 NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
-#: Elements of HTML without an end.
+#: HTML elements without an end tag.
 EMPTY = {"meta", "img"}
 ATTRIBUTES_WITH_PLACES = {"href", "src"}
 
 
 class Page(HTMLParser):
-    """Reads a page: where it leads, its headings and the cells of its tables; unbalanced elements are an error."""
+    """Reader of a page: its links, its headings and the cells of its tables; unbalanced elements are an error."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -131,7 +131,7 @@ def test_the_reference_result_is_what_fmpy_finds(archive: tuple[Path, dict[str, 
         output=names,
     )
     theirs = np.column_stack([found[name] for name in names])[: len(rows)]
-    # communication points that are added up are others by their rounding: at a sample the slope jumps
+    # summed communication points differ by rounding: at a sample the slope jumps
     chosen = [k for k, name in enumerate(names) if not name.endswith("_rate")]
     scale = np.abs(rows[:, 1:]).max(axis=0) + 1e-300
     assert (np.abs(theirs - rows[:, 1:]) / scale)[:, chosen].max() < 1e-6
@@ -148,10 +148,10 @@ def test_a_run_that_ends_early_is_kept_as_far_as_it_goes(tmp_path: Path) -> None
 
 
 def test_what_the_library_warns_of_is_told(tmp_path: Path) -> None:
-    told: list[str] = []
+    notes: list[str] = []
     starts = {"thickness": 0.02}
-    export_fmu("beam", tmp_path / "x.fmu", starts=starts, note=told.append)
-    (line,) = told
+    export_fmu("beam", tmp_path / "x.fmu", starts=starts, note=notes.append)
+    (line,) = notes
     assert line.startswith("Beam: modes: mode ")
     assert "Euler-Bernoulli" in line
 

@@ -1,4 +1,4 @@
-"""Descriptions as other tools write them: read where no number changes, and what is assumed is said."""
+"""Descriptions as other tools write them: read if no number changes, with a report of the assumptions."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def test_variables_with_the_same_fault_share_a_line_of_bounded_length() -> None:
 
 
 def many_variables(wrong: dict[int, str]) -> tuple[str, str]:
-    """Return a change that adds 1,300 variables, to some of which something is added."""
+    """Return a change that adds 1,300 variables, with an addition to some of them."""
     more = "".join(
         f'<Float64 name="v{k}" valueReference="{k + 100}" causality="local"{wrong.get(k, "")}/>'
         for k in range(1300)
@@ -277,7 +277,7 @@ def test_an_order_that_fmi_does_not_have_is_refused_at_any_place(place: int) -> 
         gain3(("</ModelStructure>", f"{''.join(listed)}</ModelStructure>"))
 
 
-#: Changes of a description of FMI 2.0, each of which FMPy finds something wrong with, or nothing.
+#: Changes of a description of FMI 2.0; FMPy finds a fault in each, or none.
 CHANGES = (
     ("<Real />", "<Real/>"),
     (GAIN, 'causality="parameter"'),
@@ -320,13 +320,13 @@ def test_nothing_is_said_where_fmpy_says_nothing_and_something_where_it_does(cha
         found: tuple[object, ...] = read(content).findings
     except ComponentFileError as refusal:
         found = (refusal,)
-    # an older FMPy looks at less
+    # an older FMPy checks less
     is_older = tuple(map(int, version("fmpy").split(".")[:3])) < (0, 3, 32)
     assert bool(found) == bool(fmpy) or (found and is_older), (found, fmpy)
 
 
 def seconds_to_read(name: str) -> float:
-    """Return the processor time that a description of 758 variables of such names takes."""
+    """Return the processor time for reading a description of 758 variables with such names."""
     many = "".join(
         f'<ScalarVariable name="{name.format(k)}" valueReference="{k}" causality="local"><Real/></ScalarVariable>'
         for k in range(10, 765)
@@ -339,12 +339,12 @@ def seconds_to_read(name: str) -> float:
 
 
 def test_names_of_any_kind_are_judged_as_fast_as_plain_ones() -> None:
-    # FMPy's grammar takes a hundredth of a second for a name: 4 s for these, where all else takes a tenth
+    # FMPy's grammar takes a hundredth of a second for a name: 4 s for these, and a tenth of a second for the rest
     assert seconds_to_read("Thruster {}.'any state'") < 5.0 * seconds_to_read("thruster_{}")
 
 
 def test_a_reference_of_five_thousand_digits_is_refused_in_a_line() -> None:
-    """Python converts no text of so many digits; zeros before a number are allowed by FMI's schema."""
+    """Python does not convert texts of so many digits; FMI's schema allows zeros before a number."""
     with pytest.raises(ComponentFileError, match="4300 digits") as refused:
         gain3(('valueReference="3"', f'valueReference="{"0" * 5000}3"'))
     assert len(str(refused.value)) < 1000

@@ -1,4 +1,4 @@
-"""The sources of an export: complete, of one version of FMI, and FMPy compiles them to the same results."""
+"""The sources of an export: complete, for one version of FMI; FMPy compiles them to a binary with the same results."""
 
 from __future__ import annotations
 

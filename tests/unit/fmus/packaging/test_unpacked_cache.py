@@ -1,4 +1,4 @@
-"""The cache of unpacked FMUs is bounded in size and age, and what a living process uses stays, also under kill -9."""
+"""The cache of unpacked FMUs is bounded in size and age; FMUs in use by a living process stay, also under kill -9."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def fmu(path: Path, size: int = 1000) -> Path:
-    """Write an FMU whose unpacked size is a little above so many bytes."""
+    """Write an FMU whose unpacked size is a little above `size` bytes."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("modelDescription.xml", DESCRIPTION)
         file.writestr("resources/z", path.name.encode() + bytes(size))
@@ -71,7 +71,7 @@ def folders_in(cache: Path) -> list[Path]:
 
 
 def forgotten(path: Path, age: float = 0.0) -> Path:
-    """Unpack an FMU as a process that has ended did, so many seconds ago."""
+    """Unpack an FMU as a process did that ended `age` seconds ago."""
     folder = unpack(path).folder
     unpacked_cache.let_go(folder)
     os.utime(folder, (time.time() - age,) * 2)
@@ -162,7 +162,7 @@ def test_a_folder_that_was_replaced_is_held_anew(tmp_path: Path, monkeypatch: py
 def test_the_files_of_a_folder_are_counted_once(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A cache of 3 GB has 330,000 files: counting them took 3.5 s of processor time at each FMU."""
+    """A cache of 3 GB has 330,000 files: counting them took 3.5 s of processor time for each FMU."""
     counted: list[Path] = []
     size = unpacked_cache._size
     monkeypatch.setattr(unpacked_cache, "_size", lambda folder: counted.append(folder) or size(folder))

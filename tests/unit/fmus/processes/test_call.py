@@ -1,4 +1,4 @@
-"""A call in a process of its own answers, or says how it ended; nothing of it outlives the call or its caller."""
+"""A call in a separate process answers, or reports its end; nothing of it outlives the call or its caller."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RUN = "builtins:exec"
 
 def test_a_function_gives_what_json_can_say() -> None:
     done = call("math:hypot", 3.0, 4.0, seconds=SECONDS)
-    assert (done.answer, done.code, done.said, done.is_late) == (5.0, 0, "", False)
+    assert (done.answer, done.code, done.stderr, done.is_late) == (5.0, 0, "", False)
 
 
 def test_a_module_without_a_function_is_run_as_a_program_in_the_folder_that_is_named(tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_caller_that_is_ended_leaves_no_process(tmp_path: Path, way: str, numb
 
 @posix
 def test_a_call_that_lets_no_thread_run_ends_though_its_caller_is_gone(tmp_path: Path) -> None:
-    """A library that hangs while it is loaded does so: then the system ends the process, some time after its caller."""
+    """A library that hangs while it is loaded does this: the system ends the process, some time after its caller."""
     program = f"import ctypes; open({str(tmp_path / 'begun')!r}, 'w').close(); ctypes.PyDLL(None).pause()"
     code = (
         "import sys; from vibroimpact.fmus.processes.call import call\n"
@@ -132,19 +132,19 @@ def test_a_call_of_this_packages_own_gives_any_object_and_raises_what_it_raises(
 def test_what_libraries_warn_of_in_a_call_of_this_packages_own_is_not_shown() -> None:
     warned = "import warnings; warnings.warn('x')"
     program = f"from vibroimpact.fmus.processes.call import call_alone; call_alone(exec, {warned!r})"
-    assert call(RUN, program, seconds=SECONDS).said == ""
-    asked = "import sys; sys.warnoptions.append('default'); " + program
-    assert "UserWarning: x" in call(RUN, asked, seconds=SECONDS).said
+    assert call(RUN, program, seconds=SECONDS).stderr == ""
+    program_with_warnings = "import sys; sys.warnoptions.append('default'); " + program
+    assert "UserWarning: x" in call(RUN, program_with_warnings, seconds=SECONDS).stderr
 
 
 @posix
 @pytest.mark.parametrize(
-    ("function", "number", "said"),
+    ("function", "number", "message"),
     [
         (os._exit, 4, "it ended with exit code 4"),
         (signal.raise_signal, signal.SIGSEGV, "it was ended by SIGSEGV"),
     ],
 )
-def test_a_call_of_this_packages_own_that_dies_says_how(function: object, number: int, said: str) -> None:
-    with pytest.raises(ProcessDied, match=said):
+def test_a_call_of_this_packages_own_that_dies_says_how(function: object, number: int, message: str) -> None:
+    with pytest.raises(ProcessDied, match=message):
         call_alone(function, number)  # type: ignore[arg-type]

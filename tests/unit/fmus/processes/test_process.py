@@ -1,4 +1,4 @@
-"""A process in a session of its own: it says lines, ends when it is told to, and takes what it has started with it."""
+"""A process in a session of its own: it prints lines, ends on request, and ends its own children with it."""
 
 from __future__ import annotations
 

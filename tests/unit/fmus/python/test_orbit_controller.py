@@ -1,4 +1,4 @@
-"""The controller's FMU alone, told of impacts by FMPy: what it answers is what its plan says."""
+"""The controller's FMU alone, with impacts reported by FMPy: its answers follow its plan."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -44,7 +44,7 @@ def plan(law: str = "ogy", **changes: Any) -> dict[str, Any]:
 
 
 class Controller:
-    """An instance by FMPy's own class."""
+    """An instance made with FMPy's own class."""
 
     def __init__(self, path: Path, **parameters: Any) -> None:
         fmu = unpack(path)
@@ -72,7 +72,7 @@ class Controller:
         return getattr(self.fmu, f"get{variable.type}")([variable.valueReference])[0]
 
     def impact(self, count: int, time: float, phase: float, velocity: float) -> tuple[float, float]:
-        """Tell of an impact; returns the force that is answered."""
+        """Report an impact; return the force that the controller answers."""
         for name, value in {
             "count": count,
             "last_time": time,
@@ -125,7 +125,7 @@ def test_the_plan_goes_on_where_two_speeds_are_one(made: Callable[..., Controlle
     assert controller.impact(1, 0.0, 0.3, 1.01)[1] == 2.0
     assert controller.impact(2, period, 0.3, 1.0095)[1] == 1.9
     assert controller.get("row") == 1
-    # the first speed of a row is none that was reached there
+    # the first speed of a row was not reached in this row
     assert controller.impact(3, 2 * period, 0.3, 1.0094)[1] == 1.8
     assert controller.impact(4, 3 * period, 0.3, 1.0094)[1] == 1.8, "there is no other row"
     patient = made(plan(stay=3))
@@ -160,7 +160,7 @@ def test_an_orbit_that_is_lost_is_told_and_the_force_goes_back(
 
 def test_an_orbit_is_located_from_the_flight_before(made: Callable[..., Controller]) -> None:
     controller = made(plan("newton", tolerance=1e-9))
-    # an orbit that is not the plan's: 0.01 s late, 0.02 m/s faster; impacts that the linear map has about it
+    # an orbit other than the plan's: 0.01 s late, 0.02 m/s faster; the linear map gives the impacts near it
     (a, b), (c, d) = plan()["rows"][0]["jacobian"]
     response, orbit = plan()["rows"][0]["response"], (0.01, 0.02)
     away = [0.003, -0.004]
@@ -179,7 +179,7 @@ def test_noise_is_the_same_for_a_seed_and_as_large_as_it_is_said(made: Callable[
         controller = made(plan(tolerance=1e-12), noise=1e-3, **parameters)
         found = []
         for n in range(1, 400):
-            # one row only: an impact in between is off
+            # the plan has one row: an impact in between is off
             controller.impact(n, n * TURN / 2.0, 0.3, 1.0)
             found.append(-controller.get("correction") / 0.05)
         return found

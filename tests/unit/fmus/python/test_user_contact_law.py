@@ -1,4 +1,4 @@
-"""A contact law written in Python answers as an FMU what it answers as a function."""
+"""A contact law written in Python gives the same answers as an FMU and as a function."""
 
 import gc
 import importlib.util
@@ -66,7 +66,7 @@ def test_an_fmu_does_not_take_the_place_of_its_law(tmp_path: Path) -> None:
 
 
 class Slave:
-    """An instance by FMPy's own class, and what it logs."""
+    """An instance made with FMPy's own class, and its log."""
 
     def __init__(self, path: Path, folder: Path, *, logging: bool = True) -> None:
         md = read_model_description(str(path))
@@ -293,7 +293,7 @@ def test_a_thousand_lives_of_a_python_component_in_one_process_take_no_more_memo
 
     path = list(sys.path)
     before = live(100)
-    # a leak is 18 kB for each, 16 MB; what else this process does may take some
+    # a leak takes 18 kB for each instance, 16 MB in total; other work of this process may take some memory
     assert live(900) - before < 8e6
-    # an entry of sys.path, where each is an instance of its own
+    # each leaked instance adds an entry to sys.path
     assert len(sys.path) <= len(path) + 1

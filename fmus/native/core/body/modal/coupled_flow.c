@@ -8,21 +8,23 @@
 #include "motion/majorant.h"
 #include "motion/power_series.h"
 
-/* Length of a segment times the fastest rate: of any motion the first term left out is below 1e-17 of it, and the largest
- * terms are 12 times it. Where the fast modes move little, longer: the first of these for which the last terms are this
- * small beside the first. What is left out is less than half of the last term up to the longest. */
+/* Length of a segment, in units of 1 / fastest rate. At REACH the first omitted term of any motion is below 1e-17 of
+ * the motion, and its largest terms are 12 times the motion. Where the fast modes move little, the first of REACHES
+ * serves at which the last terms are below NEGLIGIBLE, relative to the first. Up to the longest the omitted terms are
+ * less than half of the last term. */
 static const double REACH = 2.5, REACHES[] = {5.0, 4.25, 3.6, 3.0};
 static const double NEGLIGIBLE = 1e-18;
-/* Of a power law the terms must fall by this over a segment: it has a singularity where the contact ends. */
+/* Last terms of a power law's depth, relative to the depth times the tolerance, above which the segment ends. The law
+ * has a singularity at the end of the contact. */
 static const double SMALLEST_TERM = 0.01;
-/* In the first instants of a power law coefficient n is of size (rate / penetration)^n: the series ends before a
- * product of two of them overflows. */
+/* Coefficient above which a power law's series ends, before a product of two coefficients overflows. In the first
+ * instants of a contact coefficient n is of size (rate / penetration)^n. */
 static const double LARGEST_COEFFICIENT = 1e140;
 
-/* What is given the numbers of contacts as constants has them only where it is inlined. */
+/* Functions must be inlined for the compiler to know the numbers of contacts that they are given as constants. */
 #define INLINE static inline __attribute__((always_inline))
 
-/* Rate at which the Taylor coefficients of no motion grow faster, rad/s. */
+/* Upper bound of the growth rate of the Taylor coefficients of any motion, rad/s. */
 static double fastest_rate(const vi_structure_model *model, const vi_drift_start *start)
 {
     double stiffness = 0.0, damping = 0.0, drag = model->coupled ? model->fastest : 0.0;
@@ -45,14 +47,14 @@ static double fastest_rate(const vi_structure_model *model, const vi_drift_start
 
 /* ---- rows of modes ---- */
 
-/* The equation of the modes; its rows end with modes that do not move. */
+/* The equation of the modes; rows are filled up with modes that do not move. */
 typedef struct {
-    int width;                                             /* of the rows in use */
+    int width;                                             /* of the rows, in whole lanes */
     double stiffness[VI_ROW], drag[VI_ROW], force[VI_ROW]; /* drag: 0 where the damping couples the modes */
     double held[2][VI_ROW];                                /* constant load at the start, and its slope */
     double toward[VI_PORTS][VI_ROW];                       /* shapes, towards the stops */
-    int yields[VI_PORTS], yielding;                        /* the contacts that yield, and how many */
-    double compliance[VI_PORTS][VI_PORTS];                 /* of each contact, towards its stop, to their forces */
+    int yields[VI_PORTS], yielding;                        /* the contacts that yield, and their number */
+    double compliance[VI_PORTS][VI_PORTS];                 /* of each contact to yielding contacts' forces */
     int is_held[VI_PORTS], any_held, any_power;
 } equation;
 
@@ -115,7 +117,7 @@ static double pressed_by_line(const vi_press *press, const double d[], int n)
     return (n == 0 ? press->constant : 0.0) + press->stiffness * d[n] + press->damping * rate;
 }
 
-/* Coefficient n of the forces of the contacts that yield. */
+/* Coefficient n of the forces of the yielding contacts. */
 INLINE void press(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, int yielding,
                   vi_power_series power[])
 {
@@ -130,7 +132,7 @@ INLINE void press(vi_drift *drift, const equation *e, const vi_drift_start *star
 
 /* ---- the next coefficient of the motion ---- */
 
-/* Coefficient n of all that accelerates the modes but the contacts. */
+/* Coefficient n of the modes' accelerations by forcing, springs and uncoupled damping. */
 INLINE void load_modes(const vi_drift *drift, const equation *restrict e, double drive, int n, double *restrict load)
 {
     const double *restrict x = drift->modal[n], *restrict v = drift->modal[n + 1];
@@ -143,8 +145,8 @@ INLINE void load_modes(const vi_drift *drift, const equation *restrict e, double
     }
 }
 
-/* Coefficient n + 2 of the motion under all but constant loads, held contacts and damping that couples the modes. The
- * contacts do not wait for the modes: what the forces do to them is known from the compliances. */
+/* Coefficient n + 2 of the motion, still without the loads of inputs, held contacts and coupling damping. The contacts
+ * do not wait for the modes: the compliances give the effect of the forces on them. */
 INLINE void extend(vi_drift *drift, const equation *e, double drive, int n, double share, int contacts, int yielding)
 {
     double load[VI_ROW], *restrict next = drift->modal[n + 2];
@@ -166,7 +168,7 @@ INLINE void extend(vi_drift *drift, const equation *e, double drive, int n, doub
     }
 }
 
-/* The damping that couples the modes. */
+/* Add the damping that couples the modes. */
 static void drag(vi_drift *drift, int n, double share)
 {
     const vi_structure_model *model = drift->model;
@@ -176,7 +178,7 @@ static void drag(vi_drift *drift, int n, double share)
     }
 }
 
-/* The forces that keep the held contacts at rest: shape_k . q'' = 0 for each of them. */
+/* Add the forces that keep the held contacts at rest: shape_k . q'' = 0 for each of them. */
 static void hold(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, double share)
 {
     const vi_structure_model *model = drift->model;
@@ -207,7 +209,7 @@ static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
             const vi_mode *mode = &model->mode[j];
             double terms = fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j]);
             terms += vi_structure_drag_size(model, j, start->p);
-            for (int l = 0; l < model->contacts; ++l) { /* of stops that yield, and of the others that hold */
+            for (int l = 0; l < model->contacts; ++l) { /* of yielding and of other holding stops */
                 terms += l == k ? 0.0 : fabs(model->shape[l][j] * drift->force[l][0]);
             }
             size += fabs(model->shape[k][j]) * terms;
@@ -226,7 +228,7 @@ static double largest(const double row[], int width)
     return most;
 }
 
-/* Length of the segment times its fastest rate. */
+/* Length of the segment times the fastest rate. */
 static double reach(const vi_drift *drift, const equation *e, double fastest)
 {
     const double first = largest(drift->modal[1], e->width), second = largest(drift->modal[2], e->width);
@@ -241,7 +243,7 @@ static double reach(const vi_drift *drift, const equation *e, double fastest)
     return REACH;
 }
 
-/* A power law's own length: up to where its last terms are below the tolerance. */
+/* Shorten the segment for power laws, to where their last terms are below the tolerance. */
 static void shorten(vi_drift *drift, const vi_drift_start *start)
 {
     const double tolerance = SMALLEST_TERM * drift->model->tolerance;
@@ -258,7 +260,7 @@ static void shorten(vi_drift *drift, const vi_drift_start *start)
     }
 }
 
-/* Let the series end with this order. */
+/* End the series with this order. */
 static void end_series(vi_drift *drift, int order)
 {
     drift->order = order;
@@ -306,7 +308,7 @@ static void start_series(vi_drift *drift, const equation *e, const vi_drift_star
     }
 }
 
-/* All coefficients of the series. */
+/* Find all coefficients of the series. */
 INLINE void find_series(vi_drift *drift, const equation *e, const vi_drift_start *start, vi_power_series power[],
                         int contacts, int yielding)
 {
@@ -348,7 +350,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
     drift->rooted = 0;
     set_up(&e, model, start);
     start_series(drift, &e, start, power);
-    if (model->contacts == 1 && e.yielding == 1) { /* the usual case: loops of one */
+    if (model->contacts == 1 && e.yielding == 1) { /* the usual case, with loops of length one */
         find_series(drift, &e, start, power, 1, 1);
     } else {
         find_series(drift, &e, start, power, model->contacts, e.yielding);
@@ -362,10 +364,10 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[])
 {
     const int modes = vi_structure_modes(drift->model), width = VI_WHOLE_LANES(modes);
-    const int least = drift->rooted ? 2 : 0; /* of r^2 = u: x = u y, x' = y + r y' / 2 */
+    const int least = drift->rooted ? 2 : 0; /* with r^2 = u: x = u y, x' = y + r y' / 2 */
     const double r = vi_drift_variable(drift, u);
     double x[2][VI_LANES], v[2][VI_LANES];
-    for (int j = 0; j < width; j += 2 * VI_LANES) { /* two rows of lanes beside one another, as each waits for itself */
+    for (int j = 0; j < width; j += 2 * VI_LANES) { /* two rows of lanes at a time: each row waits for its own sum */
         const int next = j + VI_LANES < width ? j + VI_LANES : j;
         memset(v, 0, sizeof v);
         memcpy(x[0], &drift->modal[VI_ORDER][j], sizeof x[0]);

@@ -6,20 +6,20 @@
 #include "motion/majorant.h"
 #include "motion/power_series.h"
 
-/* Share of the tolerance that the last terms may have: of the depth, and of the modes' motion. */
+/* Last terms of depth and modes, relative to the tolerance times the first terms, above which the segment ends. */
 static const double SMALLEST_TERM = 0.01;
 
-/* The mode's equation, and how the contact presses it. */
+/* The equation of the modes, with the force of the contact. */
 typedef struct {
     const vi_structure_model *model;
     const vi_drift_start *start;
     int contact;
-    int32_t shift;         /* power of r that d^exponent begins with */
+    int32_t shift;         /* power of r with which d^exponent begins */
     vi_power_series power; /* e^exponent */
 } entry;
 
-/* Coefficient n of the contact's force: stiffness r^shift e^exponent (1 + damping d'), with d' = e + r e' / 2. Of a product
- * with e' the one with e follows: (e^exponent e)' = (exponent + 1) e^exponent e'. */
+/* Coefficient n of the contact's force: stiffness r^shift e^exponent (1 + damping d'), with d' = e + r e' / 2. The
+ * product with e follows from the product with e': (e^exponent e)' = (exponent + 1) e^exponent e'. */
 static double force(entry *at, const double d[], int n)
 {
     const vi_press *press = &at->start->press[at->contact];
@@ -34,7 +34,7 @@ static double force(entry *at, const double d[], int n)
     return press->stiffness * (at->power.power + press->damping * drag);
 }
 
-/* Coefficient n + 4 of the motion, from coefficient n of all that accelerates it: (r^n)'' = n (n - 2) r^(n - 4) / 4 in
+/* Coefficient n + 4 of the motion, from coefficient n of the accelerations: (r^n)'' = n (n - 2) r^(n - 4) / 4 in
  * time. */
 static void extend(vi_drift *drift, const entry *at, double drive, int n)
 {
@@ -79,7 +79,7 @@ static double whole_power(double r, int n)
     return power;
 }
 
-/* Terms n of the depth and of the modes, beside their first ones, at r = 1. */
+/* Terms n of the depth and of the modes at r = 1, relative to their first terms. */
 static double share_of_terms(const vi_drift *drift, const double depth[], int n)
 {
     double first = 0.0, last = 0.0;
@@ -90,8 +90,8 @@ static double share_of_terms(const vi_drift *drift, const double depth[], int n)
     return vi_max(fabs(depth[n]) / depth[2], last / first);
 }
 
-/* The r up to which the last terms are within the tolerance. Where the contact is all that matters, only each of shift + 2
- * terms is more than 0. */
+/* The largest r at which the last terms are within the tolerance. If the contact alone acts, only each (shift + 2)-th
+ * term is above 0. */
 static double reach(const vi_drift *drift, const entry *at)
 {
     const double *depth = drift->penetration[at->contact], tolerance = SMALLEST_TERM * drift->model->tolerance;

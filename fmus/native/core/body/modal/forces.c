@@ -3,7 +3,7 @@
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
-/* The force that another FMU gave when its stop was last asked, followed along its slopes. */
+/* The force that another FMU gave when its stop was last asked, extrapolated along its slopes. */
 static vi_press followed_force(const vi_structure *s, int k)
 {
     const vi_contact *contact = &s->contacts[k];
@@ -39,7 +39,7 @@ vi_contact_force vi_structure_yield(const vi_structure *s, int k)
         return vi_law_force(vi_law_of(s->contacts[k].law.law), &press, d, rate);
     }
     const double force = press.constant + press.stiffness * d + press.damping * rate;
-    /* an integrator looks beyond the end of a contact before it finds it: there the force goes on smoothly */
+    /* an integrator evaluates beyond the end of a contact before it locates the end: the force goes on smoothly */
     const double least = s->state->exchange.on ? force : 0.0;
     return (vi_contact_force){vi_max(least, force), press.stiffness, press.damping};
 }

@@ -7,8 +7,8 @@
 #include "body/modal/forces.h"
 #include "contact/complementarity.h"
 
-/* Of its own mobility, what is left to a contact whose point others hold. */
-static const double KEPT = 1e-9;
+/* Remaining mobility, relative to a contact's own, below which other held contacts keep its point in place. */
+static const double LEAST_MOBILITY = 1e-9;
 
 void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
 {
@@ -30,7 +30,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     }
     vi_structure_signed(s, s->model->compliance, g);
     x[k] = 1.0;
-    vi_solve_active(model->contacts, g, x, active, unit); /* 1 / effective mobility = the diagonal of the inverse */
+    vi_solve_active(model->contacts, g, x, active, unit); /* 1 / effective mobility is the diagonal of the inverse */
     view->mobility = unit[k] > 0.0 ? 1.0 / unit[k] : HUGE_VAL;
     x[k] = vi_structure_approach(s, k);
     vi_solve_active(model->contacts, g, x, active, unit);
@@ -52,7 +52,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
 }
 
-/* Size of what the modes' forcing and constant loads contribute to coefficient n of mode j. */
+/* Size of the part of the forcing and of the constant loads in coefficient n of mode j. */
 static double load_size(const vi_series_noise *noise, int j)
 {
     const vi_mode *mode = &noise->s->model->mode[j];
@@ -65,7 +65,7 @@ static double load_size(const vi_series_noise *noise, int j)
     return size;
 }
 
-/* Rounding of coefficient n - 2 of the force of contact l; a stop that yields turns that of the motion into force. */
+/* Rounding of coefficient n - 2 of the force of contact l; a yielding stop turns rounding of the motion into force. */
 static double force_noise(const vi_series_noise *noise, int l)
 {
     const vi_structure *s = noise->s;
@@ -82,7 +82,7 @@ static double force_noise(const vi_series_noise *noise, int l)
     return own + slopes.stiffness * displacement + slopes.damping * (double)(noise->n - 1) * rate;
 }
 
-/* From the rounding of coefficients n - 2 and n - 1 to that of coefficient n: theirs, and that of the terms it adds up. */
+/* Find the rounding of coefficient n from that of coefficients n - 2 and n - 1 and from the terms in its sum. */
 static void carry(vi_series_noise *noise)
 {
     const vi_structure_model *model = noise->s->model;
@@ -120,7 +120,7 @@ void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const 
         const double loads = fabs(mode->force) + fabs(noise->held[j]);
         const double within = mode->natural * fabs(s->state->q[j]) + loads * s->model->radian;
         const double velocity = fabs(drift->modal[1][j]) + within;
-        noise->before[j] = 0.0; /* the series begins where the body is */
+        noise->before[j] = 0.0; /* the series begins at the body's place */
         noise->last[j] = VI_ROUNDING * velocity;
     }
     carry(noise);
@@ -177,12 +177,12 @@ double vi_structure_mobility_left(const vi_structure *s, int k)
     for (int l = 0; l < s->model->contacts; ++l) {
         left -= g[k][l] * share[l];
     }
-    return vi_max(left, KEPT * g[k][k]);
+    return vi_max(left, LEAST_MOBILITY * g[k][k]);
 }
 
 bool vi_structure_is_kept(const vi_structure *s, int k)
 {
-    return others_hold(s, k) && vi_structure_mobility_left(s, k) <= KEPT * s->model->compliance[k][k];
+    return others_hold(s, k) && vi_structure_mobility_left(s, k) <= LEAST_MOBILITY * s->model->compliance[k][k];
 }
 
 bool vi_structure_only_touches(const vi_structure *s, int k)
@@ -191,7 +191,7 @@ bool vi_structure_only_touches(const vi_structure *s, int k)
         return false;
     }
     const double speed = vi_structure_velocity_size(s, k);
-    const double reach = s->model->fastest > 0.0 ? speed / s->model->fastest : 0.0; /* within a radian */
+    const double reach = s->model->fastest > 0.0 ? speed / s->model->fastest : 0.0; /* displacement within a radian */
     if (fabs(vi_structure_clearance(s, k)) > VI_ROUNDING * (vi_structure_displacement_size(s, k) + reach)
         || fabs(vi_structure_approach(s, k)) > VI_ROUNDING * speed) {
         return false;

@@ -75,7 +75,7 @@ void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
     }
 }
 
-/* Displacement and its derivatives of the particular part; its bound on the fourth. */
+/* The particular part: displacement, derivatives and the bound on the fourth derivative. */
 static vi_part particular(const vi_point *point, const vi_flight *flight, const vi_flight_instant *now)
 {
     const double w = flight->angular_frequency, square = w * w;
@@ -97,7 +97,7 @@ vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, co
 double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant, double horizon)
 {
     const int n = vi_structure_modes(flight->model);
-    vi_part sum[VI_MODES + 1]; /* of the particular part and the first modes */
+    vi_part sum[VI_MODES + 1]; /* the particular part and the first modes */
     double ripple[VI_MODES];
     sum[0] = particular(point, flight, instant);
     for (int j = 0; j < n; ++j) {

@@ -1,4 +1,4 @@
-/* The free flight of a structure: each mode on its own exact flow, and the points of the body as sums of them. */
+/* The free flight of a structure: each mode on its own exact flow, and points of the body as sums of the modes. */
 #ifndef VIBROIMPACT_MODAL_FLIGHT_H
 #define VIBROIMPACT_MODAL_FLIGHT_H
 
@@ -13,7 +13,7 @@ typedef struct {
     const vi_structure_model *model;
     vi_phase phase;           /* of the force at the start */
     double angular_frequency; /* rad/s */
-    double length;            /* valid for 0 <= u <= length, s; by split segments for any u */
+    double length;            /* valid for 0 <= u <= length, s; split segments are valid for any u */
     bool series;              /* is any mode followed by series? */
     vi_segment segment[VI_MODES];
 } vi_flight;
@@ -25,49 +25,48 @@ typedef struct {
     vi_part part[VI_MODES]; /* the unforced parts */
 } vi_flight_instant;
 
-/* A point of the body in a flight, seen from a stop: clearance = offset - sign * displacement. */
+/* A point of the body in a flight, seen from its stop: clearance = offset - sign * displacement. */
 typedef struct {
     const double *shape;
     double sign;
     double offset;
-    double cosine, sine, level, level_rate; /* particular displacement: the part that the forces hold at their pace */
-    double steady;                          /* its harmonic amplitude, m */
-    double scale;                           /* size of the terms added up: rounding is 1e-16 of this, m */
+    double cosine, sine, level, level_rate; /* particular displacement: the response to the forces */
+    double steady;                          /* harmonic amplitude of the particular displacement, m */
+    double scale;                           /* sum of the sizes of the terms; rounding is 1e-16 of this, m */
 } vi_point;
 
-/* Begin a flight of at most `length` seconds from modal state (q, p). `local`: counted from here, by series (low
- * bounces keep their digits so). The series form may shorten the length. */
+/* Begin a flight of at most `length` seconds from modal state (q, p). `local`: by series that count from here, which
+ * keeps the digits of low bounces. The series form may shorten the length. */
 void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const double q[], const double p[],
                      vi_phase phase, const double held[], const double held_rate[], double length, bool local);
 
-/* Count the flight, which starts now in (q, p), from where its modes were first followed; see origin.h. */
+/* Count the flight, which starts now in (q, p), from the origins of its modes; see origin.h. */
 void vi_flight_follow(vi_flight *flight, vi_instant now, const double q[], const double p[], const vi_origin origin[]);
 
-/* The flight, begun at `start`, has reached (q, p) without an event. */
+/* Tell the origins that the flight, begun at `start`, has reached (q, p) without an event. */
 void vi_flight_reach(const vi_flight *flight, vi_instant start, const double q[], const double p[], vi_origin origin[]);
 
-/* A point whose clearance at the start is known (exactly 0 on a stop). */
+/* Set up a point whose clearance at the start is known (exactly 0 on a stop). */
 void vi_point_start(vi_point *point, const vi_flight *flight, const double shape[], double sign, double clearance);
 
-/* All modes after u. */
+/* All modes after u seconds. */
 void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant);
 
 /* Clearance, approach and bound of a point at an instant. */
 vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant);
 
 /* A certified step of that point, as vi_certified_step. High modes ripple with small displacements but large
- * accelerations: where the clearance is larger than their ripple they are let out and the ripple is taken off the
- * clearance. Any number of them may be; the longest step wins. */
+ * accelerations; they are left out as vi_rippling_step does. */
 double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant, double horizon);
 
-/* Largest displacement * sign from now on for ever; false when the flight has none (series form, sloping input). */
+/* Largest displacement * sign for all later time; false when no bound exists (series form, sloping input). */
 bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *largest);
 
-/* Modal displacements and velocities after u, the forcing phase there being known (exactly, for long flights). */
+/* Modal displacements and velocities after u seconds at a known forcing phase, which keeps long flights exact. */
 void vi_flight_end(const vi_flight *flight, double u, double angle, double q[], double p[]);
 
-/* The same a moment, so short that its fourth power is nothing, after (or before) an instant, and the forcing phase: no
- * evaluation. */
+/* The same state and the forcing phase, `moment` seconds after (or before) an evaluated instant: no evaluation. The
+ * moment's fourth power must be negligible. */
 void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instant, double moment, double q[],
                         double p[], vi_phase *phase);
 

@@ -5,20 +5,19 @@
 
 #include "motion/majorant.h"
 
-/* The shortest step, in radians of the fastest rate. */
+/* Shortest step between samples, in radians of the fastest rate. */
 static const double SHORTEST_STEP = 0.05;
-/* Rounding of samples, in units of the terms that displacements are sums of; contacts closer than that are not for
- * samples to tell. */
+/* Rounding of samples, relative to the sum of sizes of a displacement's terms. Less clearance is unresolved. */
 static const double ROUNDING = 1e-12;
-/* Of a single mode steps beyond .8 radians clear little. */
+/* Longest level of steps for a single mode: steps beyond .8 radians clear little. */
 enum { LONGEST_OF_ONE = 4 };
-/* Levels by which the steps may grow from one block to the next. */
+/* Most levels by which the steps grow from one block to the next. */
 enum { STEEPEST_RISE = 3 };
 /* Blocks of samples after which a scan ends where it is. */
 enum { MOST_BLOCKS = 4096 };
 enum { MOST_ITERATIONS = 8 };
 static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
-/* Newton's step, in intervals between samples, whose square is as good as a guess can be. */
+/* Newton step, in intervals between samples, below which a guess is good enough: its error is about the square. */
 static const double CLOSE = 3e-4;
 
 /* ---- propagators ---- */
@@ -68,17 +67,17 @@ static void make(vi_scan_level *level, const vi_scan *scan, const vi_structure_m
 
 /* ---- the scan ---- */
 
-/* Bounds of the unforced part of a mode. */
+/* Bounds of the unforced part of one mode. */
 typedef struct {
-    double reach, rate, fourth; /* of the displacement, its first and its fourth derivative */
+    double reach, rate, fourth; /* of the displacement, and of its first and fourth derivatives */
 } extent;
 
-/* The same of all modes, at a contact. */
+/* Bounds of the unforced parts of all modes, at a contact. */
 typedef struct {
     double reach[VI_MODES], rate[VI_MODES], fourth[VI_MODES];
 } extents;
 
-/* An instant that samples are counted from. */
+/* An instant from which samples are counted. */
 typedef struct {
     double u, cosine, sine; /* s after the start; of the forcing phase */
     double x[VI_MODES], v[VI_MODES]; /* unforced parts */
@@ -90,13 +89,12 @@ typedef struct {
     const int *looked_for;
     int contacts;
     place at;
-    bool begins; /* it is at the instant that the scan began with */
-    vi_approach now[VI_PORTS]; /* of the contacts, there */
+    bool begins; /* at the instant at which the scan began */
+    vi_approach now[VI_PORTS]; /* of the contacts, at this instant */
     extents extent[VI_PORTS];  /* of the contacts */
 } scanner;
 
-/* An underdamped mode swings within its amplitude; the energy of no mode grows. So bounds at the start of a flight hold
- * all along. */
+/* Bounds of a mode for a whole flight: an underdamped mode stays within its amplitude, and energies never grow. */
 static extent extent_of(const vi_segment *segment)
 {
     const vi_mode *mode = segment->mode;
@@ -123,21 +121,20 @@ static void take_extents(scanner *s, int k)
     }
 }
 
-/* ---- how much samples leave open ---- */
+/* ---- uncertainty between samples ---- */
 
-/* Between two samples, of a contact's clearance and of its rate. */
+/* Uncertainty of a contact's clearance and of its rate between two samples. */
 typedef struct {
-    double off_cubic; /* off the cubic that has the values and rates of both */
-    double ripple;    /* of what ripples, which samples leave out */
-    double rate;      /* off the rate of the cubic, ripples and all, times a third of the step */
+    double off_cubic; /* deviation from the cubic with the values and rates of both samples */
+    double ripple;    /* size of the rippling modes, which samples leave out */
+    double rate;      /* deviation from the cubic's rate, ripples included, times a third of the step */
 } opening;
 
-/* The fourth power of a step times the bound of a fourth derivative is this many times as far as a motion may lie off
- * the cubic with its values and rates at both ends; times a third of the step its rate lies off by less than this many
- * times as much. */
+/* Largest deviation from the cubic with the values and rates at both ends of a step h: SHARE_OF_FOURTH h^4 bound. The
+ * rate's deviation times h/3 is less than SHARE_OF_RATE times as large. bound: of the fourth derivative. */
 static const double SHARE_OF_FOURTH = 1.0 / 384.0, SHARE_OF_RATE = 1.0265;
 
-/* Is a motion that stays within `reach` let out of samples: is a cubic no better? */
+/* Is a motion within `reach` left out of samples, because its cubic would be no better? */
 static bool ripples(double fourth, double share, double reach)
 {
     return fourth * share >= reach;
@@ -169,20 +166,20 @@ static opening opening_of(const scanner *s, int k, double step)
     return o;
 }
 
-/* By how much acceleration may bring a contact that leaves its stop back within a step, m/s. */
+/* Largest speed by which acceleration may bring a contact that leaves its stop back within a step, m/s. */
 static double speed_back(const vi_approach *p, double step)
 {
     return vi_max(0.0, p->acceleration) * (0.5 * step) + vi_max(0.0, p->jerk) * (step * step * SIXTH)
            + p->bound * (step * step * step * (0.25 * SIXTH));
 }
 
-/* Does the contact begin on its stop? */
+/* Does contact k begin on its stop? */
 static bool on_stop(const scanner *s, int k)
 {
     return s->begins && s->now[k].clearance <= ROUNDING * s->points[k].scale;
 }
 
-/* Does it look as if the first interval of this length were cleared, and the next? */
+/* Are the first two intervals of this length likely to be cleared? */
 static bool is_worth(const scanner *s, double step)
 {
     for (int k = 0; k < s->contacts; ++k) {
@@ -200,7 +197,7 @@ static bool is_worth(const scanner *s, double step)
     return true;
 }
 
-/* The longest step that is worth a block of samples, up to that of `longest` and above that of `shortest`, else that one. */
+/* The longest step that is worth a block of samples, from `longest` down to `shortest`; `shortest` if none is. */
 static int level_between(const scanner *s, int shortest, int longest)
 {
     int l = longest;
@@ -212,8 +209,8 @@ static int level_between(const scanner *s, int shortest, int longest)
 
 /* ---- samples ---- */
 
-/* Of one contact, at the instant where the scan is and after 1 to VI_SCAN_SAMPLES steps, without what ripples: the
- * clearance, and its rate times a third of the step. */
+/* Samples of one contact at the scan's instant and after 1 to VI_SCAN_SAMPLES steps, without rippling modes. third:
+ * rate of the clearance times a third of the step. */
 typedef struct {
     double clearance[VI_SCAN_SAMPLES + 1], third[VI_SCAN_SAMPLES + 1];
 } samples;
@@ -254,10 +251,10 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
     }
 }
 
-/* What becomes of an interval between two samples. */
+/* Verdict on an interval between two samples. */
 typedef enum { CLEARED, HAS_CONTACT, UNDECIDED } verdict;
 
-/* Of an interval that the cubic does not clear: the contact comes closer all along, or that is not certain. */
+/* Verdict on an interval that the cubic does not clear: a contact if the body surely comes closer throughout. */
 static verdict judge(const samples *at, const opening *o, int i, bool is_off)
 {
     const double first = at->third[i], last = at->third[i + 1];
@@ -271,11 +268,11 @@ static verdict judge(const samples *at, const opening *o, int i, bool is_off)
     return at->clearance[i + 1] > o->ripple ? CLEARED : UNDECIDED;
 }
 
-/* Intervals of a block, from its beginning on, that are cleared of one contact; *next is what becomes of the one after. */
+/* Number of first intervals of a block that are cleared for one contact; *next: verdict on the next interval. */
 static int cleared_of(const scanner *s, const vi_scan_level *level, int k, verdict *next)
 {
     samples at;
-    double lowest[VI_SCAN_SAMPLES]; /* of the points that control the cubic, within whose hull it lies */
+    double lowest[VI_SCAN_SAMPLES]; /* of the cubic's control points; the cubic lies in their hull */
     const opening o = opening_of(s, k, level->step);
     const double enough = o.off_cubic + o.ripple;
     sample(s, level, k, &at);
@@ -298,7 +295,7 @@ static int cleared_of(const scanner *s, const vi_scan_level *level, int k, verdi
     return i;
 }
 
-/* The same of all contacts; of several that are met in one interval none is known to be the first. */
+/* Number of intervals cleared for all contacts. Of several contacts in one interval none is known to be first. */
 static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, int *contact)
 {
     int least = VI_SCAN_SAMPLES;
@@ -322,7 +319,7 @@ static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, 
 
 /* ---- from sample to sample ---- */
 
-/* Go on by 1 to VI_SCAN_SAMPLES steps. */
+/* Move a place on by 1 to VI_SCAN_SAMPLES steps. */
 static void go(place *at, const vi_structure_model *model, const vi_scan_level *level, int steps)
 {
     const int i = steps - 1;
@@ -337,7 +334,7 @@ static void go(place *at, const vi_structure_model *model, const vi_scan_level *
     }
 }
 
-/* Clearance, speed and acceleration that a contact's stop sees. */
+/* Clearance, velocity and acceleration of a contact towards its stop. */
 static vi_approach approach_at(const scanner *s, const place *at, int k)
 {
     const vi_point *point = &s->points[k];
@@ -366,8 +363,7 @@ static void advance(scanner *s, const vi_scan_level *level, int steps)
     }
 }
 
-/* The zero, between two samples, of the polynomial of fifth order that has the clearances, speeds and accelerations of
- * both: a guess. */
+/* Guess of the zero between two samples, by the quintic with the clearances, speeds and accelerations of both. */
 static double guess(const vi_approach *a, const vi_approach *b, double step)
 {
     const double d0 = a->clearance, d1 = -a->velocity * step, d2 = -0.5 * a->acceleration * step * step;
@@ -391,7 +387,7 @@ static double guess(const vi_approach *a, const vi_approach *b, double step)
     return t * step;
 }
 
-/* The contact is in the interval after `steps`. */
+/* Bracket the contact in the interval after `steps`. */
 static void bracket(const scanner *s, const vi_scan_level *level, int steps, int k, vi_scan_found *found)
 {
     place low = s->at, high = s->at;

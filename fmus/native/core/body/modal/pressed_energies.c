@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-/* A velocity scale vector e^(rate t): of a term, of the response to the harmonic force, or of a slope's. */
+/* A movement with velocity scale vector e^(rate t): a term, the harmonic response, or a slope's response. */
 typedef struct {
-    vi_complex rate, scale, from, to; /* from, to: e^(rate t) at the start and at the end, times what it starts as */
+    vi_complex rate, scale, from, to; /* from, to: e^(rate t) at the start and at the end, times the initial value */
     const vi_complex *vector;
 } mover;
 
@@ -15,10 +15,10 @@ typedef struct {
     int count;
     mover mover[VI_TERMS + 2];
     vi_complex slope[VI_MODES];
-    double at_stop[VI_PORTS], damping_loss; /* of the dashpots, of the body, J */
+    double at_stop[VI_PORTS], damping_loss; /* of the dashpots, and of the body, J */
 } sums;
 
-/* ---- what moves ---- */
+/* ---- movements ---- */
 
 static void collect(sums *sum)
 {
@@ -54,7 +54,7 @@ static vi_complex seen(int modes, const mover *m, const double weight[])
 
 /* ---- work of the loads ---- */
 
-/* Of the harmonic force. */
+/* Work of the harmonic force, J. */
 static double forcing_work(const sums *sum)
 {
     const vi_structure_model *model = sum->s->model;
@@ -76,8 +76,8 @@ static double forcing_work(const sums *sum)
     return work;
 }
 
-/* Of the loads that the inputs hold, from q on, and of their slopes: these as what they have grown to, less the way that
- * was moved before they did. */
+/* Work of the loads that the inputs hold and of their slopes since displacements q, J. By parts, a slope's work is its
+ * growth times the final displacement, less the integral of slope times displacement. */
 static double load_work(const sums *sum, const double q[])
 {
     const vi_structure *s = sum->s;
@@ -89,7 +89,7 @@ static double load_work(const sums *sum, const double q[])
         still += held[j] * moved;
         grown += rate[j] * (u * (s->state->q[j] - sum->flow->level[j] - 0.5 * u * sum->flow->level_rate[j]));
     }
-    for (int i = 0; i < sum->count - 1; ++i) { /* the integral of the displacement, but for its level */
+    for (int i = 0; i < sum->count - 1; ++i) { /* integral of the displacement without its level */
         const mover *m = &sum->mover[i];
         vi_complex way = {0.0, 0.0};
         for (int j = 0; j < vi_structure_modes(s->model); ++j) {
@@ -100,16 +100,16 @@ static double load_work(const sums *sum, const double q[])
     return still + grown;
 }
 
-/* ---- what the dampings take ---- */
+/* ---- losses of the dampings ---- */
 
-/* Real part of the integral of Re(a e) Re(b f) for movements e, f whose products integrate to `same`, with f turned round
- * to `across`: a b is `product`, a b* `mixed`. */
+/* Real part of the integral of Re(a e) Re(b f) for movements e and f. `same`: integral of e f; `across`: integral of e
+ * f*; `product`: a b; `mixed`: a b*. */
 static double share(vi_complex product, vi_complex same, vi_complex mixed, vi_complex across)
 {
     return 0.5 * (vi_complex_multiply(product, same).re + vi_complex_multiply(mixed, across).re);
 }
 
-/* Of movements a and b. */
+/* Add the losses of a pair of movements a and b. */
 static void add_pair(sums *sum, const mover *a, const mover *b, const vi_complex drag[], const vi_complex at_a[],
                      const vi_complex at_b[], double times)
 {
@@ -165,7 +165,7 @@ static void add_losses(sums *sum)
 
 /* ---- a rest ---- */
 
-/* Energy that a spring has taken since displacements q, J. */
+/* Energy stored in a spring since displacements q, J. */
 static double spring_work(const vi_structure *s, int k, double stiffness, const double q[])
 {
     const double sign = vi_structure_direction(s, k), *shape = s->model->shape[k];

@@ -1,10 +1,10 @@
-/* Energies of a long rest: exact integrals of its terms, two by two. */
+/* Energies of a long rest: exact integrals of pairs of its terms. */
 #ifndef VIBROIMPACT_PRESSED_ENERGIES_H
 #define VIBROIMPACT_PRESSED_ENERGIES_H
 
 #include "body/modal/pressed_flow.h"
 
-/* Add what a rest of u seconds has done, from the displacements q to those of the body now. */
+/* Add the energies of a rest of u seconds that moved the body from the displacements q to its present ones. */
 void vi_energies_of_rest(const vi_structure *s, const vi_pressed_flow *flow, const double q[], double u);
 
 #endif

@@ -9,13 +9,13 @@
 #include "modes/pressed_response.h"
 #include "motion/ripple.h"
 
-/* The response may be this many times larger than the motion: it takes so many roundings off it. */
+/* Largest response, relative to the motion; a larger one would cost the motion more than this many roundings. */
 static const double LARGEST_RESPONSE = 64.0;
-/* Below this many radians the integral of a term is its series: else the difference of its ends is rounding. */
+/* Radians of a term below which its integral is a series, since the difference of its end values would be rounding. */
 static const double SHORT = 0.5;
 enum { SERIES = 14 };
 
-/* ---- what the body rests on ---- */
+/* ---- the contacts of a rest ---- */
 
 static bool is_linear(const vi_structure *s, int k)
 {
@@ -25,7 +25,7 @@ static bool is_linear(const vi_structure *s, int k)
     if (s->state->status[k] != VI_CONTACT_YIELDING || s->state->leaving[k]) {
         return false;
     }
-    const vi_contact_law *law = &s->contacts[k].law; /* the force of an external one is not followed so far */
+    const vi_contact_law *law = &s->contacts[k].law; /* refuses external laws: their force is not known over a rest */
     return vi_law_of(law->law)->press == VI_PRESS_LINEAR && law->stiffness > 0.0 && !vi_structure_is_kept(s, k);
 }
 
@@ -86,14 +86,14 @@ static bool same_body(const vi_pressed_body *a, const vi_pressed_body *b)
     return same;
 }
 
-/* Does it rest as asked, seen from the same points? */
+/* Are the kept modes those of the present contacts, seen from the same points? */
 static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
 {
     const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
     bool same = pressed->known != VI_MODES_UNKNOWN && pressed->contacts == model->contacts
-                && same_body(&pressed->asked, &pressed->body)
+                && same_body(&pressed->present, &pressed->body)
                 && memcmp(pressed->observed, model->observed, size) == 0;
-    for (int i = 0; i < pressed->asked.contacts && same; ++i) {
+    for (int i = 0; i < pressed->present.contacts && same; ++i) {
         same = pressed->port[i] == port[i];
     }
     for (int l = 0; l < model->contacts && same; ++l) {
@@ -128,11 +128,11 @@ static void weigh_all(vi_pressed *pressed, const vi_structure_model *model)
 
 static void begin(vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
 {
-    pressed->known = VI_MODES_NOT_TOLD;
-    pressed->sought = 0;
+    pressed->known = VI_MODES_NOT_FOUND;
+    pressed->searched = 0;
     pressed->still.known = pressed->harmonic.known = 0;
     pressed->contacts = model->contacts;
-    pressed->body = pressed->asked;
+    pressed->body = pressed->present;
     memcpy(pressed->port, port, sizeof pressed->port);
     memcpy(pressed->shape, model->shape, sizeof pressed->shape);
     memcpy(pressed->observed, model->observed, sizeof pressed->observed);
@@ -148,25 +148,25 @@ const vi_pressed *vi_pressed_find(const vi_structure *s, bool all)
     vi_pressed *pressed = s->pressed;
     int32_t port[VI_PORTS] = {0};
     const int contacts = vi_pressed_contacts(s, port);
-    describe(s, port, contacts, &pressed->asked);
+    describe(s, port, contacts, &pressed->present);
     if (!rests_as(pressed, s->model, port)) {
         begin(pressed, s->model, port);
     }
-    if (pressed->known == VI_MODES_NOT_TOLD && all && !pressed->sought) {
-        pressed->sought = 1;
+    if (pressed->known == VI_MODES_NOT_FOUND && all && !pressed->searched) {
+        pressed->searched = 1;
         if (vi_coupled_modes_find(&pressed->modes, &pressed->body, &pressed->work)) {
             pressed->known = VI_MODES_OF_ALL;
             vi_coupled_equations_find(&pressed->still, &pressed->body, (vi_complex){0.0, 0.0});
             weigh_all(pressed, s->model);
         }
     }
-    const bool told = pressed->known == VI_MODES_OF_ONE || (all && pressed->known == VI_MODES_OF_ALL);
-    return told ? pressed : NULL;
+    const bool is_known = pressed->known == VI_MODES_OF_ONE || (all && pressed->known == VI_MODES_OF_ALL);
+    return is_known ? pressed : NULL;
 }
 
 /* ---- the flow ---- */
 
-/* The response to loads in the form Re(load e^(s t)), s being 0 or the forcing's. */
+/* Response to loads of the form Re(load e^(s t)); s is 0 or that of the forcing. */
 static void answer(const vi_pressed *pressed, vi_complex s, const vi_complex load[], const vi_complex offset[],
                    vi_complex q[], vi_complex force[])
 {
@@ -187,7 +187,7 @@ static void respond_to_forcing(vi_pressed_flow *flow, const vi_structure *s)
     answer(flow->pressed, (vi_complex){0.0, flow->angular_frequency}, load, none, flow->harmonic, flow->harmonic_force);
 }
 
-/* To the loads from now on, with their slopes. */
+/* Response to the present loads, with their slopes. */
 static void respond_to_loads(vi_pressed_flow *flow, const vi_structure *s, const double held[])
 {
     const vi_pressed *pressed = flow->pressed;
@@ -223,7 +223,7 @@ static void respond_to_loads(vi_pressed_flow *flow, const vi_structure *s, const
     }
 }
 
-/* Does the response leave the motion its digits, in displacements and in the velocities that they turn into? */
+/* Does the response leave the motion its digits, in displacements and in the velocities that follow from them? */
 static bool keeps_digits(const vi_pressed_flow *flow, const vi_structure *s, double length)
 {
     const vi_pressed_body *body = &flow->pressed->body;
@@ -241,7 +241,7 @@ static bool keeps_digits(const vi_pressed_flow *flow, const vi_structure *s, dou
     return response <= LARGEST_RESPONSE * way && response_speed <= LARGEST_RESPONSE * speed;
 }
 
-/* The equations of the response to the forcing, which may have another frequency than when the modes were found. */
+/* Find the equations of the response to the forcing, unless they are known at its present frequency. */
 static void know_harmonic(vi_pressed *pressed, double angular_frequency)
 {
     vi_coupled_equations *harmonic = &pressed->harmonic;
@@ -274,7 +274,7 @@ bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, const v
     return keeps_digits(flow, s, length);
 }
 
-/* Do the contacts stand, and are their stops, as they were? */
+/* Are the contacts' status and the stops unchanged since the origin of the rest? */
 static bool same_stops(const vi_structure *s)
 {
     const vi_rest_origin *origin = &s->state->rest;
@@ -402,7 +402,7 @@ double vi_pressed_flow_impulse(const vi_pressed_flow *flow, int i, double u)
     return sum;
 }
 
-/* ---- what is seen ---- */
+/* ---- observed quantities ---- */
 
 vi_pressed_sight vi_pressed_sight_of(const vi_pressed_flow *flow, int seen, double sign, double offset, double length)
 {
@@ -430,7 +430,7 @@ vi_pressed_sight vi_pressed_sight_of(const vi_pressed_flow *flow, int seen, doub
     return sight;
 }
 
-/* The response, and the bound on its fourth derivative. */
+/* The response of an observed quantity, with the bound on its fourth derivative. */
 static vi_part response_at(const vi_pressed_sight *sight, const vi_pressed_flow *flow, double u)
 {
     const double w = flow->angular_frequency, angle = flow->angle + w * u, square = w * w;
@@ -441,7 +441,7 @@ static vi_part response_at(const vi_pressed_sight *sight, const vi_pressed_flow 
                      square * square * amplitude, 0.0};
 }
 
-/* One term, which only decays. */
+/* One term of an observed quantity; it only decays. */
 static vi_part term_at(vi_complex weight, vi_complex part, vi_complex rate)
 {
     const vi_complex x = vi_complex_multiply(weight, part), v = vi_complex_multiply(rate, x);
@@ -466,7 +466,7 @@ double vi_pressed_step(const vi_pressed_sight *sight, const vi_pressed_flow *flo
                        double horizon)
 {
     const vi_pressed_modes *modes = &flow->pressed->modes;
-    vi_part sum[VI_TERMS + 1]; /* of the response and the slow terms */
+    vi_part sum[VI_TERMS + 1]; /* the response and the slow terms */
     double ripple[VI_TERMS];
     sum[0] = response_at(sight, flow, u);
     for (int m = 0; m < modes->terms; ++m) {

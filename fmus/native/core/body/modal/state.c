@@ -13,7 +13,7 @@ void vi_structure_mode(vi_structure_model *model, int j, double natural, double 
     vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * natural, natural * natural, force, angular_frequency);
 }
 
-/* A bound on the rates that a full damping matrix brings. */
+/* Bound on the rates of a full damping matrix. */
 static double coupling_rate(const vi_structure_model *model)
 {
     double most = 0.0;
@@ -27,7 +27,7 @@ static double coupling_rate(const vi_structure_model *model)
     return most;
 }
 
-/* shape . impulse to 32 digits: its rounded value is returned, what that leaves over is *low. */
+/* shape . impulse to 32 digits: the rounded value is returned, *low is its remainder. */
 static double twofold_dot(const vi_structure_model *model, const double shape[], const double impulse[], double *low)
 {
     double sum = 0.0, left = 0.0;
@@ -92,7 +92,7 @@ vi_phase vi_structure_phase(const vi_structure *s)
 void vi_structure_phase_is(const vi_structure *s, vi_phase phase)
 {
     const double angle = s->model->clock.angular_frequency * s->state->now.rest;
-    if (angle != 0.0) { /* a period begins with phase 0 exactly */
+    if (angle != 0.0) { /* a period begins exactly at phase 0 */
         s->state->phase = (vi_phase){angle, phase.cosine, phase.sine};
     }
 }
@@ -125,7 +125,7 @@ double vi_structure_clearance(const vi_structure *s, int k)
     return vi_structure_direction(s, k) * (s->contacts[k].position - displacement);
 }
 
-/* Is the stop one that impacts alone are answered with, and is the contact met there? */
+/* Does contact k meet a stop that answers only with impulses? */
 static bool is_rigid(const vi_structure *s, int k)
 {
     return vi_structure_watched(s, k) && s->model->stop[k] == VI_RIGID_STOP;
@@ -227,7 +227,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
     vi_structure_state *state = s->state;
     memcpy(state->held, held, (size_t)vi_structure_modes(s->model) * sizeof held[0]);
     memcpy(state->held_rate, held_rate, (size_t)vi_structure_modes(s->model) * sizeof held_rate[0]);
-    if (state->exchange.on) { /* the importer gives the inputs at each instant: there is no step that slopes are for */
+    if (state->exchange.on) { /* the importer gives inputs at each instant: there is no step with slopes */
         memset(state->held_rate, 0, sizeof state->held_rate);
     }
     state->held_since = state->now;

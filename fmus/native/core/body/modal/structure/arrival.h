@@ -6,13 +6,13 @@
 
 #include "body/modal/state.h"
 
-/* External laws among the contacts that are hit: wait for their answers, or (FMI 2.0) note the time and fly through. */
+/* Treat external laws among the hit contacts: wait for their answers, or (FMI 2.0) note the time and fly through. */
 bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here);
 
-/* Those that are hit: compliant stops begin to yield, rigid ones answer together. */
+/* Resolve the hit contacts: compliant stops begin to yield, rigid stops answer together. */
 void vi_structure_resolve_hits(const vi_structure *s, const int hit[]);
 
-/* Contact k has arrived at its stop (others may have, too): resolve it, or wait for an answer, or pass (FMI 2.0). */
+/* Contact k has arrived at its stop, possibly with others: resolve it, wait for an answer, or pass (FMI 2.0). */
 void vi_structure_meet(const vi_structure *s, int k, bool stop_here);
 
 #endif

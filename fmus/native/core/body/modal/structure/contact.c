@@ -9,13 +9,13 @@
 #include "body/modal/held.h"
 #include "motion/majorant.h"
 
-/* Contacts whose clearance is below this many roundings of their displacement meet at the same instant. */
+/* Clearance, in roundings of the displacement, below which contacts meet at the same instant. */
 static const double SAME_INSTANT = 16.0;
-/* A contact whose force ends at a penetration of so many roundings, or of a power law with 1 + damping d' above so
- * little, ends with its penetration. */
-static const double WITH_IT = 4.0, GONE = 1e-9;
+/* Penetration, in roundings, above which a contact recedes after its force has ended; below, it ends with its
+ * penetration. ENDED: value of 1 + damping d' up to which the force of a power law counts as ended. */
+static const double RECEDES = 4.0, ENDED = 1e-9;
 
-/* ---- rest and release ---- */
+/* ---- sticking and release ---- */
 
 void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_impulse)
 {
@@ -31,8 +31,8 @@ void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_i
     vi_contact_stick(&s->contacts[k], &s->model->clock, state->now, delay);
 }
 
-/* Is the rest that ends at contact k one to record? A body that a run let go at this very instant may be found pressed
- * again by the rounding of its loads, for the rounding of the time. */
+/* Is the rest that ends at contact k to be recorded? A body let go at this very instant may be found pressed again by
+ * the rounding of its loads, for a time of rounding size. */
 static bool is_rest(const vi_structure *s, int k)
 {
     const vi_contact *contact = &s->contacts[k];
@@ -40,8 +40,8 @@ static bool is_rest(const vi_structure *s, int k)
     return contact->stick_end - contact->stick_start > rounding || s->state->tail_impulse[k] > 0.0;
 }
 
-/* Which contacts touch only because contact k holds their point. */
-static void those_held_by(const vi_structure *s, int k, int touching[])
+/* List the contacts that touch only because contact k holds their point. */
+static void find_held_by(const vi_structure *s, int k, int touching[])
 {
     const int32_t status = s->state->status[k];
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -62,7 +62,7 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
     if (!contact->earlier && is_rest(s, k)) {
         vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
     }
-    those_held_by(s, k, touching);
+    find_held_by(s, k, touching);
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = leaving;
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -72,7 +72,7 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
 
 /* ---- compliant stops ---- */
 
-/* The period in which a contact begins counts it once. */
+/* Count a contact once, in the period in which it begins. */
 static void count_once(const vi_structure *s, int k)
 {
     s->record->period_impacts += !s->state->touch_down[k].counted;
@@ -89,7 +89,7 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     s->state->status[k] = VI_CONTACT_YIELDING;
     s->state->series = 0;
     s->state->leaving[k] = 0;
-    /* a contact that begins now begins at depth 0: a graze is over before its depth would outgrow rounding */
+    /* a contact that begins now begins at depth 0: a graze ends before its depth would exceed rounding */
     if (fabs(vi_structure_clearance(s, k)) <= SAME_INSTANT * DBL_EPSILON * size) {
         s->state->leaving[k] = approach > 0.0 ? 1 : 2;
     }
@@ -106,14 +106,14 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     contact->impulse = 0.0;
 }
 
-/* What has the sign of a compliant contact's force, whether it is pressed or not. */
+/* A number with the sign of a compliant contact's force, whether the contact is pressed or not. */
 static double pressing_now(const vi_structure *s, int k)
 {
     const vi_press press = vi_structure_stop_press(s, k);
     return vi_press_sense(&press, -vi_structure_clearance(s, k), vi_structure_approach(s, k));
 }
 
-/* A contact that ends at the instant at which it began without speed has only touched: it stays as it is until something moves. */
+/* A contact that ends as it begins, without speed, has only touched. It stays so until something moves. */
 static bool only_touched(const vi_structure *s, int k)
 {
     if (s->state->leaving[k] != 2) {
@@ -124,8 +124,8 @@ static bool only_touched(const vi_structure *s, int k)
     return true;
 }
 
-/* Is a contact, as far as it has come, a touch of rounding size? It began without speed, has no impulse and does not
- * go in now: it is no impact. An impulse is known only where the force is integrated in here. */
+/* Is a contact, so far, a touch of rounding size and no impact? Such a touch began without speed, has no impulse and
+ * does not go in now. The impulse is known only where the force is integrated here. */
 static bool is_rounding(const vi_structure *s, int k)
 {
     const vi_touch_down *touch = &s->state->touch_down[k];
@@ -145,7 +145,7 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     const double restitution = touch->velocity > 0.0 ? vi_max(0.0, rebound) / touch->velocity : 0.0;
     const double penetration = -vi_structure_clearance(s, k);
     const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
-    /* the last push of a thin contact has thrown it out a little before this instant */
+    /* the last push of a thin contact has thrown it out shortly before this instant */
     const double late = penetration < 0.0 && rebound > 0.0 ? -penetration / rebound : 0.0;
     if (is_rounding(s, k)) {
         s->contacts[k].count -= 1;
@@ -158,14 +158,14 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
         }
     }
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
-    state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
+    state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a faster surface follows without force */
     state->separated[k] = state->now;
     const bool linear = vi_structure_stop_press(s, k).kind == VI_PRESS_LINEAR;
-    /* the force is gone before the penetration, or with it */
-    if (receding && (linear ? penetration > WITH_IT * noise : pressing_now(s, k) <= GONE && penetration > noise)) {
+    /* the force ends before the penetration, or with it */
+    if (receding && (linear ? penetration > RECEDES * noise : pressing_now(s, k) <= ENDED && penetration > noise)) {
         state->status[k] = VI_CONTACT_RECEDING;
     } else {
-        /* an impact elsewhere may have put it off its stop, and be on its way back */
+        /* after an impact elsewhere it may be off its stop, and on its way back */
         state->status[k] = -penetration > SAME_INSTANT / 4.0 * noise ? VI_CONTACT_FREE : VI_CONTACT_TOUCHING;
         state->leaving[k] = 0;
     }
@@ -205,7 +205,7 @@ void vi_structure_return(const vi_structure *s, int k)
     vi_structure_touch_down(s, k);
 }
 
-/* ---- what goes on ---- */
+/* ---- contacts that go on ---- */
 
 void vi_structure_begin_recording(const vi_structure *s)
 {
@@ -213,11 +213,11 @@ void vi_structure_begin_recording(const vi_structure *s)
     s->record->period_impacts = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const bool yields = s->state->status[k] == VI_CONTACT_YIELDING, before = s->state->moved != 0;
-        const bool rests = s->state->status[k] == VI_CONTACT_HELD && s->contacts[k].stick_start <= now;
-        s->contacts[k].earlier = before && (yields || rests);
+        const bool sticks = s->state->status[k] == VI_CONTACT_HELD && s->contacts[k].stick_start <= now;
+        s->contacts[k].earlier = before && (yields || sticks);
         s->state->touch_down[k].counted = before;
         if (yields && !before && s->state->touch_down[k].velocity > 0.0) {
-            count_once(s, k); /* the start state has pressed it in */
+            count_once(s, k); /* pressed in by the start state */
         }
     }
 }

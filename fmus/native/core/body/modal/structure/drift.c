@@ -13,16 +13,17 @@
 #include "body/modal/structure/pressed.h"
 #include "body/modal/structure/thin.h"
 
-/* A power law is entered as a thin contact from this much of the depth of that thin contact. */
+/* Depth, relative to the depth reached by a thin contact, below which a power law counts as thin. */
 static const double ENTRY = 1e-3;
 
-/* Or from so many roundings of the displacement: the series, whose steps are parts of the depth, would not move it. */
+/* Depth, in roundings of the displacement, below which a power law counts as thin too. Steps of its series are parts of
+ * the depth and would not move it. */
 static const double SHALLOW = 32.0;
 
-/* Of the square of the rate of a contact on its way out, what its force does over the way at most. */
+/* Velocity change over the way out times the rate, relative to the squared rate, below which the rate is kept. */
 static const double COASTS = 1e-2;
 
-/* Does a contact on its way out keep its rate, whatever still presses it? */
+/* Does a contact on its way out keep its rate, despite the force that still presses it? */
 static bool coasts(const vi_structure *s, int k, double depth, double rate)
 {
     const double force = vi_structure_yield(s, k).force;
@@ -44,19 +45,19 @@ static void look(const vi_structure *s, vi_situation *now)
             now->length = vi_min(now->length, s->contacts[k].relaxation_time);
         }
         now->kept[k] = s->state->status[k] == VI_CONTACT_YIELDING && vi_structure_is_kept(s, k);
-        if (now->kept[k]) { /* its force is what it is: rounding would move it, and set the pace */
+        if (now->kept[k]) { /* constant force, since rounding would move it and set the step */
             now->press[k] = (vi_press){VI_PRESS_LINEAR, vi_structure_yield(s, k).force, 0.0, 0.0, 1.0};
         }
     }
 }
 
-/* Depth that is no more than rounding, of contact k. */
+/* Depth of rounding size of contact k, m. */
 static double shallow_depth(const vi_structure *s, int k)
 {
     return SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
 }
 
-/* Is a power law pressed in deeper than any thin contact, whose time is a radian at most? */
+/* Is a power law pressed in deeper than any thin contact? A thin contact lasts a radian at most. */
 static bool is_deep(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration)
 {
     const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
@@ -64,13 +65,13 @@ static bool is_deep(const vi_structure *s, const vi_situation *now, int k, doubl
     return now->at[k] > thickest && now->at[k] > shallow_depth(s, k);
 }
 
-/* Is power law k thin? For how long at most? */
+/* Is power law k thin? *time: for how long at most. */
 static bool is_thin(const vi_structure *s, const vi_situation *now, int k, double rate, double acceleration,
                     double *time)
 {
     const double depth = vi_max(0.0, now->at[k]), shallow = shallow_depth(s, k);
     *time = vi_thin_time(s, k, rate, now->acceleration, rate < 0.0 && depth > shallow ? -depth / rate : 0.0);
-    /* the way in: as far as its series would need steps much shorter than this one */
+    /* on the way in it is thin while its series would need steps much shorter than *time */
     const double reached = (rate + 0.5 * vi_max(0.0, acceleration) * *time) * *time;
     const double entered = vi_max(ENTRY * reached, shallow);
     const double left = vi_max(-rate * *time, coasts(s, k, depth, rate) ? shallow : 0.0);
@@ -89,11 +90,11 @@ static void look_at_power(const vi_structure *s, vi_situation *now, int k, doubl
         now->thin[k] = 1;
         now->any_thin = true;
         now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
-        now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
+        now->length = vi_min(now->length, time); /* on its way out it may turn round before it is out */
     }
 }
 
-/* Which power laws are thin, and how far the others' series may go. */
+/* Find the thin power laws, and how far the series of the others may go. */
 static void look_at_powers(const vi_structure *s, vi_situation *now)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -103,15 +104,14 @@ static void look_at_powers(const vi_structure *s, vi_situation *now)
                 look_at_power(s, now, k, rate);
             }
             if (rate < 0.0 && !now->thin[k]) {
-                /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
+                /* not past a turning point next to depth 0: there the power law is |d|^n, but its series is d^n */
                 now->length = vi_min(now->length, -now->at[k] / rate);
             }
         }
     }
 }
 
-/* The one contact that begins to press at this instant, by a power law, while all others are free and off their stops;
- * -1: there is none. */
+/* The contact that begins to press now, by a power law, while all others are free and off their stops; -1: none. */
 static int entering(const vi_structure *s, const vi_situation *now)
 {
     int found = -1;
@@ -128,7 +128,7 @@ static int entering(const vi_structure *s, const vi_situation *now)
     return s->model->coupled ? -1 : found;
 }
 
-/* Follow the beginning of a contact, where that goes further in than rounding. */
+/* Follow the beginning of a contact if it goes in further than rounding. */
 static bool enter(const vi_structure *s, const vi_situation *now, const vi_drift_start *start, double length,
                   vi_drift *drift)
 {
@@ -164,8 +164,7 @@ static double energy_now(const vi_structure *s)
     return vi_structure_kinetic(s) + elastic;
 }
 
-/* What is added at a segment's end, thin contacts' impulses and what holds the held ones against them, is energy that
- * the stops have taken. */
+/* Finish a segment: add impulses of thin contacts, project held contacts. Stops take the lost energy. */
 static void finish(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)
 {
     const bool follow = now->any_thin && s->state->follow_energies;
@@ -188,7 +187,7 @@ static void follow_energies(const vi_structure *s, const vi_drift *drift, const 
     vi_energies_of_drift(s, drift, now->held, still, u);
 }
 
-/* Nothing moves and nothing will: a body at rest on a stop under constant loads. */
+/* Does nothing move, now and later? So it is for a body at rest on a stop under constant loads. */
 static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const vi_situation *now)
 {
     const vi_structure_model *model = s->model;
@@ -207,7 +206,7 @@ static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const
     return true;
 }
 
-/* What a drift costs, in evaluations of a mode. */
+/* Cost of a drift, in evaluations of a mode. */
 static int64_t drift_evaluations(const vi_structure_model *model)
 {
     const int64_t modes = vi_structure_modes(model);

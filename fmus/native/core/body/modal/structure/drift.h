@@ -6,7 +6,7 @@
 
 /* Follow the coupled motion to its next event, the end of a segment or `length`, whichever is first; returns the time
  * moved. *k is the contact of the event, or -1. The state (q, p) is moved, the instant is not. Arrivals up to `room`
- * after the length count as at it. */
+ * after the length count as arrivals at the length. */
 double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k);
 
 #endif

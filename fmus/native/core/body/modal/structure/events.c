@@ -11,13 +11,13 @@
 #include "body/modal/structure/thin.h"
 #include "motion/majorant.h"
 
-/* A surface that has relaxed to less than this times the displacements is at rest. */
+/* Distance of a relaxing surface, relative to the displacements, below which the surface is at rest. */
 static const double RELAXED = 1e-16;
 
-/* A receding contact that is pressed by more than so many roundings was thrown back. */
-static const double THROWN = 1e4;
+/* Press of a receding contact, in roundings, up to which its return is searched. Above, it returns at once. */
+static const double MOST_PRESS = 1e4;
 
-/* A search has found this, or nothing up to fall->time. */
+/* Take the result of a search: an event, or none up to fall->time. */
 static void consider(vi_event_found *first, const vi_fall *fall, vi_drift_event event, int contact)
 {
     if (!fall->found) {
@@ -27,7 +27,7 @@ static void consider(vi_event_found *first, const vi_fall *fall, vi_drift_event 
     }
 }
 
-/* Where a polynomial falls through zero; touches from above are passed over. */
+/* First fall of a polynomial through zero; touches from above are passed over. */
 static vi_fall fall_through(const double c[VI_ORDER + 1], double length, double noise)
 {
     vi_fall fall = vi_polynomial_fall(c, 0.0, length, noise);
@@ -52,7 +52,7 @@ bool vi_structure_stays(const vi_structure *s, const vi_drift *drift, int k, con
         }
         terms += fabs(s->model->shape[k][j]) * size;
     }
-    /* the loads and the other stops' forces that holding forces take off again */
+    /* the loads and the other stops' forces, which holding forces cancel */
     terms += drift->force_scale[k] * fabs(s->model->mobility[k][k]) * length * length;
     for (int l = 0; l < s->model->contacts; ++l) {
         terms += fabs(s->model->compliance[k][l]) * vi_polynomial_size(drift->force[l], length) * length * length;
@@ -60,8 +60,7 @@ bool vi_structure_stays(const vi_structure *s, const vi_drift *drift, int k, con
     return moved <= VI_ROUNDING * terms;
 }
 
-/* Let the series of what is 0 at the start, but for rounding, begin with coefficient `first`: divided by that power of time
- * it has the same zeros but that one. */
+/* Divide a series that starts at 0, within rounding, by time to the power `first`. It keeps all other zeros. */
 static void divide(double c[VI_ORDER + 1], int first)
 {
     for (int n = 0; n <= VI_ORDER; ++n) {
@@ -69,8 +68,8 @@ static void divide(double c[VI_ORDER + 1], int first)
     }
 }
 
-/* What is known exactly of the motion of contact k, which touches: thin contacts, which its series leaves out, lift it
- * off, or have just ceased to hold it. */
+/* Set the exactly known start of touching contact k. Thin contacts, which its series leaves out, lift the contact off,
+ * or have just ceased to hold it. */
 static void correct_start(const vi_structure *s, const vi_situation *now, int k, double clearance[VI_ORDER + 1])
 {
     const int exact = s->state->leaving[k];
@@ -84,9 +83,9 @@ static void correct_start(const vi_structure *s, const vi_situation *now, int k,
     }
 }
 
-/* A contact that leaves its stop with neither speed nor acceleration: the first coefficient that is more than rounding
- * moves it. Divided by that power of time, its clearance has the same zeros but the one at the start. False where
- * nothing moves it. */
+/* Divide the clearance of a contact that leaves its stop with neither speed nor acceleration. The first coefficient
+ * above rounding moves it; divided by that power of time, the clearance keeps all zeros but the one at the start. False
+ * where nothing moves the contact. */
 static bool divide_by_start(const vi_structure *s, const vi_drift *drift, int k, double clearance[VI_ORDER + 1])
 {
     int first = 2;
@@ -123,14 +122,13 @@ static void arrivals(const vi_structure *s, const vi_drift *drift, const vi_situ
             return;
         }
         noise = VI_ROUNDING * vi_polynomial_size(clearance, length);
-        pressed = clearance[0] < 0.0; /* by what has happened at this instant since it left */
+        pressed = clearance[0] < 0.0; /* pressed by an event at this instant, since it left */
     }
     const vi_fall fall = pressed ? (vi_fall){true, 0.0, 0.0} : vi_polynomial_fall(clearance, 0.0, length, noise);
     consider(first, &fall, VI_DRIFT_ARRIVAL, k);
 }
 
-/* Where the force of held contact k, thin contacts' part and all, falls through zero; without that part it does so at
- * `alone`. */
+/* First fall of held contact k's force through zero, thin contacts included. Without them it falls at `alone`. */
 static vi_fall release_beside_thin(const vi_structure *s, const vi_drift *drift, const vi_situation *now, int k,
                                    vi_fall alone, double length, double noise)
 {
@@ -161,7 +159,7 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
     const double scale = drift->force_scale[k] * s->model->compliance[k][k] / vi_structure_mobility_left(s, k);
     const double noise = VI_ROUNDING * (scale + size);
     vi_fall fall = {true, 0.0, 1.0};
-    /* opposite stops at one place, each of whose shares is rounding, may have left it a pull of so many roundings */
+    /* opposite stops at one place may have left a pull of VI_PORTS roundings: the share of each is rounding */
     if (force[0] <= noise && force[0] >= -VI_PORTS * noise && fabs(thin) <= noise) {
         divide(force, vi_structure_first_of_force(s, drift, k));
         if (force[0] >= 0.0) {
@@ -175,7 +173,7 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
     consider(first, &fall, VI_DRIFT_RELEASE, k);
 }
 
-/* Rounding of what has the sign of a compliant contact's force: the force itself or, of a power law, 1 + damping d'. */
+/* Rounding of a number with the sign of a compliant force: the force itself or, for a power law, 1 + damping d'. */
 static double pressing_noise(const vi_structure *s, int k)
 {
     const vi_press press = vi_structure_stop_press(s, k);
@@ -183,9 +181,9 @@ static double pressing_noise(const vi_structure *s, int k)
     return VI_ROUNDING * (level + (press.damping != 0.0 ? press.damping * vi_structure_velocity_size(s, k) : 0.0));
 }
 
-/* What has the sign of a yielding contact's force, and falls through zero with it: the force itself or, of a power law,
- * 1 + damping d'. The series of its force does not reach as far as that of the motion: near touch-down it moves nothing
- * yet, but has its singularity there. */
+/* Series with the sign of a yielding contact's force: the force itself or, for a power law, 1 + damping d'. The series
+ * of a power law's force reaches less far than that of the motion. Near touch-down this force moves nothing yet, but
+ * its series has a singularity there. */
 static void pressing(const vi_situation *now, int k, const double depth[VI_ORDER + 1], double sense[VI_ORDER + 1])
 {
     const vi_press *press = &now->press[k];
@@ -198,7 +196,7 @@ static void pressing(const vi_situation *now, int k, const double depth[VI_ORDER
     sense[0] += power ? 1.0 : press->constant;
 }
 
-/* Where a contact that has just begun might end: depth = r^2 e(r), whose rate is e + r e' / 2. */
+/* Ends of a contact that has just begun: depth = r^2 e(r), whose rate is e + r e' / 2. */
 static void ends_of_entry(const vi_drift *drift, const vi_situation *now, int k, double length, vi_event_found *first)
 {
     double depth[VI_ORDER + 1], sense[VI_ORDER + 1];
@@ -218,7 +216,7 @@ static void ends_of_entry(const vi_drift *drift, const vi_situation *now, int k,
     }
 }
 
-/* Where the force of a yielding contact falls through zero. */
+/* Ends of a yielding contact where its force falls through zero. */
 static void ends_of_force(const vi_structure *s, const vi_situation *now, int k, const double depth[VI_ORDER + 1],
                           double length, vi_event_found *first)
 {
@@ -229,7 +227,7 @@ static void ends_of_force(const vi_structure *s, const vi_situation *now, int k,
     }
     const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
     vi_fall fall = {true, 0.0, 1.0};
-    /* else an impact elsewhere, or the start, has thrown the point off its stop */
+    /* otherwise an impact elsewhere, or the start, has thrown the point off its stop */
     if (force[0] >= -rounding || force[0] >= -pressing_noise(s, k)) {
         fall = fall_through(force, length, rounding);
     }
@@ -244,7 +242,7 @@ static void separations(const vi_structure *s, const vi_drift *drift, const vi_s
     if (now->thin[k] && vi_structure_stays(s, drift, k, depth, length)) {
         return;
     }
-    if (s->state->leaving[k] == 2) { /* what begins to press without speed does not move out by rounding */
+    if (s->state->leaving[k] == 2) { /* a contact that begins to press without speed must not move out by rounding */
         depth[1] = vi_max(0.0, depth[1]);
         depth[2] = vi_max(0.0, depth[2]);
     }
@@ -258,8 +256,8 @@ static void separations(const vi_structure *s, const vi_drift *drift, const vi_s
     }
 }
 
-/* What must fall to zero for a receding contact to press again: minus its force or, where the surface needs time, the
- * distance to it. */
+/* Distance that reaches 0 when a receding contact presses again: minus its force, or the distance to a lagging
+ * surface. */
 static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, double gap[VI_ORDER + 1])
 {
     const vi_contact *contact = &s->contacts[k];
@@ -279,7 +277,7 @@ static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, d
             gap[n] = -((n == 0 ? 1.0 : 0.0) + press.damping * rate);
         }
     }
-    gap[VI_ORDER] = lags ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is not known */
+    gap[VI_ORDER] = lags ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is unknown */
 }
 
 static void returns(const vi_structure *s, const vi_drift *drift, int k, double length, vi_event_found *first)
@@ -292,8 +290,8 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         const double small = VI_ROUNDING * vi_polynomial_size(gap, length);
         vi_fall fall = {true, 0.0, 1.0};
         const bool lags = vi_structure_surface_lags(s, k);
-        /* else an impact elsewhere has thrown the point back */
-        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : pressing_noise(s, k))) {
+        /* otherwise an impact elsewhere has thrown the point back */
+        if (gap[0] >= -MOST_PRESS * vi_max(small, lags ? noise : pressing_noise(s, k))) {
             fall = vi_polynomial_fall(gap, 0.0, length, small);
         }
         consider(first, &fall, VI_DRIFT_RETURN, k);
@@ -318,7 +316,7 @@ vi_event_found vi_structure_first_event(const vi_structure *s, const vi_drift *d
     length = vi_drift_variable(drift, length);
     searched = vi_drift_variable(drift, searched);
     vi_event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1, length};
-    /* compliant stops first: of events at one instant theirs comes first, one that would pull no longer bears on others */
+    /* compliant stops first: at one instant their events precede others, so a stop that would pull does not act */
     for (int turn = 0; turn < 2 * s->model->contacts; ++turn) {
         const int k = turn % s->model->contacts;
         const bool compliant = s->state->status[k] >= VI_CONTACT_YIELDING;

@@ -15,10 +15,9 @@
 #include "body/modal/structure/settle.h"
 #include "body/step.h"
 
-/* Distance from zero, in roundings, at which an indicator changes its sign: a contact that has just left its stop, or has
- * just met it, is not told to do so again. */
+/* Offset of an indicator's change of sign, in roundings: a contact that just left or met its stop signals only once. */
 static const double INDICATED = 16.0;
-/* Times that the contacts are looked at again at one instant: each look may set off others, in a corner. */
+/* Most checks of the contacts at one instant; in a corner each check may set off others. */
 enum { MOST_LOOKS = 2 * VI_PORTS };
 
 void vi_exchange_enable(const vi_exchange_body *body)
@@ -64,7 +63,7 @@ static bool is_supported(const vi_exchange_body *body, char *message)
     return message[0] == '\0';
 }
 
-/* Where the loads, the start and the stops say that the motion is at home. */
+/* Set the nominal values from the loads, the start and the stops. */
 static void find_nominals(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
@@ -113,7 +112,7 @@ bool vi_exchange_set_time(const vi_exchange_body *body, double time)
     return true;
 }
 
-/* From the body's modes to the description's, of which those that are not in use are 0. */
+/* From the body's modes to the states of the description; states beyond the modes in use are 0. */
 static void show(const vi_exchange_body *body, const double modal[], double shown[])
 {
     const int used = vi_structure_modes(body->parts.model);
@@ -126,7 +125,7 @@ static void show(const vi_exchange_body *body, const double modal[], double show
     }
 }
 
-/* And back: q = Psi' M x is the inverse of x = Psi q. */
+/* From the states of the description to the body's modes: q = Psi' M x is the inverse of x = Psi q. */
 static void take(const vi_exchange_body *body, const double shown[], double modal[])
 {
     const int used = vi_structure_modes(body->parts.model);
@@ -178,8 +177,8 @@ void vi_exchange_get_derivatives(const vi_exchange_body *body, double derivative
 
 /* ---- indicators ---- */
 
-/* What has the sign of a compliant contact's force, m: the depth that its force is as large as in rest; of a power law
- * what is left of 1 + damping d', times the depth that is typical of this motion. */
+/* A depth with the sign of a compliant contact's force, m. For a linear law it is the depth at which the force at rest
+ * is as large. For a power law it is 1 + damping d' times the depth that is typical of this motion. */
 static double pressing_depth(const vi_structure *s, int k)
 {
     const vi_press press = vi_structure_stop_press(s, k);
@@ -187,7 +186,7 @@ static double pressing_depth(const vi_structure *s, int k)
     return vi_press_sense_depth(&press, -vi_structure_clearance(s, k), vi_structure_approach(s, k), typical);
 }
 
-/* Resolution of a displacement of contact k: of its terms, and of what a velocity makes of them within a radian. */
+/* Resolution of a displacement of contact k, m: from its terms, and from the velocity times a radian. */
 static double resolution(const vi_structure *s, int k)
 {
     const double fastest = s->model->fastest;
@@ -195,7 +194,7 @@ static double resolution(const vi_structure *s, int k)
     return INDICATED * DBL_EPSILON * (vi_structure_displacement_size(s, k) + reach);
 }
 
-/* > 0 as long as contact k stays what it is; `force`: those of the held contacts. */
+/* Indicator of contact k, > 0 as long as its status stays; `force`: forces of the held contacts. */
 static double indicator(const vi_structure *s, int k, const double force[])
 {
     const double clearance = vi_structure_clearance(s, k), room = resolution(s, k);
@@ -236,7 +235,7 @@ void vi_exchange_show_indicators(const vi_exchange_body *body)
 
 /* ---- events ---- */
 
-/* A free contact has reached its stop: is it hit? Not where it is on its way off, but for the integrator's error. */
+/* A free contact has reached its stop: is it hit? Not if it is on its way off, apart from the integrator's error. */
 static int arrive(const vi_structure *s, int k)
 {
     const double approach = vi_structure_approach(s, k), noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
@@ -252,7 +251,7 @@ static int arrive(const vi_structure *s, int k)
     return approach > noise;
 }
 
-/* What the sign of its indicator says of contact k; true when it is hit. */
+/* Act on the sign of the indicator of contact k; true when the contact is hit. */
 static int look_at(const vi_structure *s, int k, const double force[])
 {
     if (!vi_structure_watched(s, k) || indicator(s, k, force) > 0.0) {
@@ -293,7 +292,7 @@ static void look_at_all(const vi_structure *s)
     }
 }
 
-/* Impacts set off by impacts, rests and releases, until nothing more happens at this instant. */
+/* Resolve impacts set off by impacts, rests and releases, until nothing more happens at this instant. */
 static void settle(const vi_structure *s)
 {
     for (int look = 0; look < MOST_LOOKS; ++look) {
@@ -322,7 +321,7 @@ bool vi_exchange_event(const vi_exchange_body *body, bool *changed, bool *limit,
     look_at_all(s);
     settle(s);
     vi_structure_project(s);
-    /* there are integrators that go on with the steps they have made unless a state has jumped: forces count too */
+    /* some integrators keep their past steps unless a state has jumped: changed forces count as a jump too */
     *changed = memcmp(q, s->state->q, size) != 0 || memcmp(p, s->state->p, size) != 0
                || memcmp(status, s->state->status, sizeof status) != 0;
     *limit = s->model->impact_limit > 0 && s->state->budget.events >= s->model->impact_limit;

@@ -6,21 +6,21 @@
 #include "body/landing.h"
 #include "motion/majorant.h"
 
-/* Nodes and weights of Gauss-Legendre quadrature with eight points, for -1 to 1 (the other half by symmetry). */
+/* Nodes and weights of Gauss-Legendre quadrature with eight points on [-1, 1] (the other half by symmetry). */
 static const double NODES[4] = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
                                 0.96028985649753623168};
 static const double WEIGHTS[4] = {0.36268378337836198297, 0.31370664587788728734, 0.22238103445337447054,
                                   0.10122853629037625915};
-/* Length of a piece of quadrature times the fastest rate: eight points then integrate to the last digits. */
+/* Length of a piece of quadrature, in units of 1 / fastest rate; eight points then integrate to the last digits. */
 static const double PIECE = 1.5;
 
-/* Pieces of a segment of drift, which may be 5 over the fastest rate. */
+/* Pieces of a segment of drift, which may be 5 / fastest rate long. */
 enum { DRIFT_PIECES = 4 };
 
-/* Turns of a polynomial over one segment. */
+/* Most turning points of a polynomial that are searched in one segment. */
 enum { MOST_TURNS = 16 };
 
-/* Evaluations that a climb is counted as. */
+/* Cost of a climb in the budget, in evaluations of all modes. */
 enum { CLIMB = 8 };
 
 /* ---- extremes ---- */
@@ -30,25 +30,25 @@ static void extend(const vi_structure *s, double displacement)
     vi_record_extend(s->record, vi_structure_within(s, displacement));
 }
 
-/* Climb from u to the next turning point of the observed displacement times sign; returns its time. */
+/* Climb from u to the next turning point of the observed displacement times sign; returns the time of this point. */
 static double climb(const vi_flight *flight, const vi_point *point, double u, double end, double *top)
 {
     vi_flight_instant now;
     for (int evaluation = 0;; ++evaluation) {
         vi_flight_at(flight, u, &now);
         const vi_approach p = vi_point_approach(point, flight, &now);
-        *top = p.clearance; /* of a stop above: falls as the point rises */
+        *top = p.clearance; /* clearance of a stop above: falls as the point rises */
         const double noise = 4.0 * DBL_EPSILON * (fabs(p.velocity) + point->scale * flight->model->fastest);
         if (!(p.velocity > noise) || u >= end) {
             return u;
         }
-        /* the velocity falls to zero as a clearance does */
+        /* search the velocity's fall to zero like a clearance's */
         const vi_approach fall = {p.velocity, -p.acceleration, -p.jerk, p.bound, 0.0};
         u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), vi_least_step(end, 1e-12, evaluation)));
     }
 }
 
-/* Largest displacement * sign over the flight: regions that stay below the largest one seen are passed over. */
+/* Find the largest displacement * sign over the flight; regions below the largest value so far are skipped. */
 static void extreme(const vi_structure *s, const vi_flight *flight, double sign, double end)
 {
     vi_flight_instant now;
@@ -70,7 +70,7 @@ static void extreme(const vi_structure *s, const vi_flight *flight, double sign,
             double top;
             u = climb(flight, &point, u, end, &top);
             vi_budget_spend(&s->state->budget, CLIMB * vi_structure_modes(s->model));
-            point.offset += vi_max(0.0, -top); /* the bar is raised to what was reached */
+            point.offset += vi_max(0.0, -top); /* raise the bar to the value reached */
             u += least_step;
             continue;
         }
@@ -100,7 +100,7 @@ static void differentiate(const double c[VI_ORDER + 1], double sign, double slop
     slope[VI_ORDER] = 0.0;
 }
 
-/* Where a polynomial turns round next after `from`; HUGE_VAL where it does not up to the end. */
+/* Time of the next turning point of a polynomial after `from`; HUGE_VAL when there is none up to the end. */
 static double next_turn(const double polynomial[VI_ORDER + 1], double from, double end)
 {
     double slope[VI_ORDER + 1], value[4];
@@ -121,7 +121,7 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
     vi_polynomial_at(polynomial, end, value);
     extend(s, here + value[0]);
     if (vi_polynomial_size(polynomial, end) <= VI_ROUNDING * fabs(here)) {
-        return; /* it is held: what its polynomial says is rounding */
+        return; /* the point is held: its polynomial is mere rounding */
     }
     for (int turn = 0; turn < MOST_TURNS && from < end; ++turn) {
         const double at = next_turn(polynomial, from, end);
@@ -136,7 +136,7 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
 
 /* ---- largest forces ---- */
 
-/* The largest value of a polynomial from 0 to the end. */
+/* The largest value of a polynomial on [0, end]. */
 static double largest_value(const double polynomial[VI_ORDER + 1], double end)
 {
     double value[4], from = 0.0;
@@ -166,7 +166,7 @@ void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u)
 
 /* ---- energies ---- */
 
-/* Power of the applied forces and of the damping at modal velocities p, the forcing phase being `angle`. */
+/* Add the power of the applied forces and of the damping at modal velocities p and forcing phase `angle`. */
 static void add_powers(const vi_structure *s, const double p[], const double held[], double u, double angle,
                        double weight)
 {
@@ -217,7 +217,7 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
     double q[VI_MODES], p[VI_MODES], weight, value[4];
     for (int i = 0; i < 8 * DRIFT_PIECES; ++i) {
         const double r = node((double)(i / 8) * piece, piece, i % 8, &weight), t = drift->rooted ? r * r : r;
-        const double slope = drift->rooted ? 2.0 * r : 1.0; /* of t over r */
+        const double slope = drift->rooted ? 2.0 * r : 1.0; /* derivative of t over r */
         vi_drift_at(drift, t, s->state->q, p, q);
         add_powers(s, p, held, t, angle + w * t, slope * weight);
         for (int k = 0; k < s->model->contacts; ++k) {

@@ -1,4 +1,4 @@
-/* What is recorded along a motion when it is asked for: extremes of the observed point, energies. */
+/* Optional records along a motion: extremes of the observed point, energies, largest forces. */
 #ifndef VIBROIMPACT_STRUCTURE_EXTREMES_H
 #define VIBROIMPACT_STRUCTURE_EXTREMES_H
 
@@ -8,20 +8,20 @@
 
 /* ---- energies, when they are followed ---- */
 
-/* How long a flight may be for its energies, s: HUGE_VAL when they are not followed. */
+/* Longest flight for its energies, s; HUGE_VAL when energies are not followed. */
 double vi_energies_reach(const vi_structure *s);
 void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u);
-/* Contacts that are `still` do no work: what their series say of their motion is rounding. */
+/* Contacts that are `still` do no work: the motion in their series is rounding. */
 void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
                           double u);
-/* A drift from the displacements `q` that rounding and the stops that hold have undone, more than half of it, was no
- * motion: the loads did no work over what is undone. */
+/* Take back the work of the loads over a drift from the displacements `q` that the holding stops have undone. A drift
+ * of which more than half is undone was rounding and no motion. */
 void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const double q[], const double held[],
                              double u);
 
 /* ---- largest forces of contacts that yield ---- */
 
-/* Of the contacts whose impacts are recorded, over the first u seconds of a drift; its thin contacts have no force there. */
+/* Largest forces of recorded contacts over the first u seconds of a drift. Thin contacts have no force there. */
 void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u);
 
 /* ---- extremes of the observed point ---- */

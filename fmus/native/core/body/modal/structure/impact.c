@@ -13,18 +13,18 @@
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
-/* A joint impact may set off others at the same instant; each round loses energy or ends, but between stops that leave
- * no room it would go on for ever. */
+/* Rounds of joint impacts at one instant, each set off by the one before. Each round loses energy or ends; only between
+ * stops that leave no room the rounds would never end. */
 static const int MOST_ROUNDS = 64;
 
-/* Height of a bounce, relative to the motion, that any integrator can follow. */
+/* Height of a bounce, relative to the motion, that any integrator follows; unresolved heights are cut to it. */
 static const double HIGHEST_UNRESOLVED = 1e-4;
 
 static double restitution_of(const vi_structure *s, int k, double approach)
 {
     const vi_contact *contact = &s->contacts[k];
-    const bool asked = s->model->asks && vi_contact_law_is_external(contact->law.law);
-    return asked ? contact->applied_restitution : vi_contact_law_restitution(&contact->law, approach);
+    const bool is_answered = s->model->asks && vi_contact_law_is_external(contact->law.law);
+    return is_answered ? contact->applied_restitution : vi_contact_law_restitution(&contact->law, approach);
 }
 
 static double drag_at(const vi_structure *s, int k)
@@ -39,21 +39,21 @@ static double drag_at(const vi_structure *s, int k)
     return drag / model->mobility[k][k];
 }
 
-/* Size of displacements that double precision cannot tell apart at a contact, m. */
+/* Largest difference of displacements that double precision cannot resolve at a contact, m. */
 static double resolution(const vi_structure *s, int k, double pressure, double approach)
 {
     const bool low = vi_chatter_is_low(pressure, approach, s->model->fastest);
     return DBL_EPSILON * (low ? fabs(s->contacts[k].position) : vi_structure_displacement_size(s, k));
 }
 
-/* Height of a bounce that can be told from none: by rounding, or by the integrator of model exchange. */
+/* Smallest resolved height of a bounce, limited by rounding, or by the integrator of model exchange. */
 static double bounce_resolution(const vi_structure *s, int k, double pressure, double rebound)
 {
     const double integrated = s->state->exchange.unresolved * sqrt(s->model->compliance[k][k]);
     return vi_max(integrated, resolution(s, k, pressure, rebound));
 }
 
-/* The plastic impact that stands for the rest of a chatter sequence, or for a stop without rebound. */
+/* Apply the plastic impact that replaces the rest of a chatter sequence, or acts on a stop without rebound. */
 static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view, double delay, double tail_impulse)
 {
     const double before = s->state->follow_energies ? vi_structure_kinetic(s) : 0.0;
@@ -62,7 +62,7 @@ static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view,
     vi_structure_rest(s, k, delay, tail_impulse);
 }
 
-/* Rest on stop k now if the bounces still to come can be summed (or are too low, or too many, to be followed). */
+/* Stick on stop k now if the remaining bounces can be summed (or are too low, or too many, to be followed). */
 static void rest_if_summable(const vi_structure *s, int k, double rebound, double restitution, bool tiny)
 {
     vi_held_view view;
@@ -85,13 +85,13 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
                           .resolution = bounce_resolution(s, k, view.pressure, rebound),
                           .tiny = tiny};
     const vi_chatter chatter = vi_chatter_look(&b, s->state->low_impacts[k]);
-    if (chatter.rests) {
+    if (chatter.sticks) {
         const double impulse = (1.0 + restitution) * rebound / (view.mobility * (1.0 - restitution));
         come_to_rest(s, k, &view, chatter.duration, chatter.summed ? impulse : 0.0);
     }
 }
 
-/* Speed at which contact k leaves after the impulses: that of its law, or more where others have thrown it off. */
+/* Speed at which contact k leaves after the impulses: its law's rebound, or more where others have thrown it off. */
 static double rebound_of(const vi_structure *s, int k, double approach, double impulse, double restitution)
 {
     const double own = restitution * approach, speed = -vi_structure_approach(s, k);
@@ -119,7 +119,7 @@ static bool is_tiny(double acceleration, double rebound, double fastest, double 
                                   || 2.0 * rebound * fastest <= VI_SHORT_FLIGHT * acceleration);
 }
 
-/* One contact after the impulses: count it, and let it rest where its chatter can be summed. */
+/* Finish an impact of one contact: count it, and let it stick where its chatter can be summed. */
 static void after_impact(const vi_structure *s, int k, double approach, double impulse, double restitution)
 {
     vi_structure_state *state = s->state;
@@ -144,12 +144,12 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
     state->leaving[k] = rebound == 0.0 ? 1 : 0;
     const bool counted =
         vi_chatter_count(&state->fastest_impact[k], &state->low_impacts[k], approach, rebound, graze, tiny);
-    if (counted || state->exchange.on) { /* an integrator cannot follow bounces below its tolerance, however few */
+    if (counted || state->exchange.on) { /* an integrator cannot follow bounces below its tolerance, not even a few */
         rest_if_summable(s, k, rebound, restitution, tiny);
     }
 }
 
-/* To the modes, rounded once: what is less than a rounding of the impulse still decides how a velocity is rounded. */
+/* Add the impulses to the modes, rounded once: parts below its rounding still decide the rounding of a velocity. */
 static void give_impulses(const vi_structure *s, const double impulse[], const double low[])
 {
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -163,7 +163,7 @@ static void give_impulses(const vi_structure *s, const double impulse[], const d
     }
 }
 
-/* What rounding has taken from the impulses p > 0 of g p = b, g given to twice its digits. */
+/* The rounding residual of the impulses p > 0 of g p = b, with g given to twice its digits. */
 static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_PORTS], const double b[],
                    const double p[], double more[])
 {
@@ -183,15 +183,15 @@ static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_
 }
 
 /* The impulse of a contact that is alone in play. */
-static void own_impulse(const vi_structure *s, int k, double wanted, double *impulse, double *impulse_low)
+static void own_impulse(const vi_structure *s, int k, double change, double *impulse, double *impulse_low)
 {
-    const double g = s->model->mobility[k][k], p = wanted / g;
+    const double g = s->model->mobility[k][k], p = change / g;
     *impulse = p;
-    *impulse_low = (fma(-g, p, wanted) - s->model->mobility_low[k][k] * p) / g;
+    *impulse_low = (fma(-g, p, change) - s->model->mobility_low[k][k] * p) / g;
 }
 
-/* Solve for the impulses of the contacts in play; the others are out of the problem. */
-static void joint_impulses(const vi_structure *s, const int in_play[], const double wanted[], double impulse[],
+/* Solve for the impulses of the contacts in play; all others are left out. */
+static void joint_impulses(const vi_structure *s, const int in_play[], const double change[], double impulse[],
                            double impulse_low[])
 {
     double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
@@ -205,13 +205,13 @@ static void joint_impulses(const vi_structure *s, const int in_play[], const dou
     }
     if (count == 1 && s->model->mobility[index[0]][index[0]] > 0.0) {
         const int k = index[0];
-        own_impulse(s, k, wanted[k], &impulse[k], &impulse_low[k]);
+        own_impulse(s, k, change[k], &impulse[k], &impulse_low[k]);
         return;
     }
     vi_structure_signed(s, s->model->mobility, whole);
     vi_structure_signed(s, s->model->mobility_low, whole_low);
     for (int i = 0; i < count; ++i) {
-        b[i] = wanted[index[i]];
+        b[i] = change[index[i]];
         for (int j = 0; j < count; ++j) {
             g[i][j] = whole[index[i]][index[j]];
             low[i][j] = whole_low[index[i]][index[j]];
@@ -225,12 +225,12 @@ static void joint_impulses(const vi_structure *s, const int in_play[], const dou
     }
 }
 
-/* One round: every contact that is hit asks for its rebound; those at rest on a stop only may not be pushed in. */
+/* One round: every hit contact demands its rebound; a contact that rests on its stop may only not be pushed in. */
 static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, wanted[VI_PORTS] = {0.0};
+    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, change[VI_PORTS] = {0.0};
     double impulse[VI_PORTS], impulse_low[VI_PORTS];
     int in_play[VI_PORTS] = {0};
     const double before = vi_structure_kinetic(s);
@@ -241,16 +241,16 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
         if (hit[k]) {
             approach[k] = vi_max(0.0, vi_structure_approach(s, k));
             restitution[k] = restitution_of(s, k, approach[k]);
-            wanted[k] = (1.0 + restitution[k]) * approach[k];
+            change[k] = (1.0 + restitution[k]) * approach[k];
         }
     }
-    joint_impulses(s, in_play, wanted, impulse, impulse_low);
+    joint_impulses(s, in_play, change, impulse, impulse_low);
     give_impulses(s, impulse, impulse_low);
     state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
     for (int k = 0; k < n; ++k) {
         s->contacts[k].total_impulse += in_play[k] && !hit[k] ? impulse[k] : 0.0;
         if (in_play[k] && !hit[k] && state->leaving[k] > 1) {
-            state->leaving[k] = 1; /* its acceleration may be another now */
+            state->leaving[k] = 1; /* its acceleration may have changed */
         }
         if (in_play[k] && !hit[k] && !(impulse[k] > 0.0)
             && vi_structure_approach(s, k) < -VI_ROUNDING * vi_structure_velocity_size(s, k)) {
@@ -267,7 +267,7 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
     }
 }
 
-/* A body between stops that leave it no room: whatever touches comes to rest. */
+/* A body between stops that leave no room: every touching contact comes to rest. */
 static void wedge(const vi_structure *s)
 {
     double g[VI_PORTS][VI_PORTS], approach[VI_PORTS], impulse[VI_PORTS];
@@ -331,7 +331,7 @@ void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
         int any = 0;
         for (int k = 0; k < s->model->contacts; ++k) {
             const bool rigid = s->model->stop[k] == VI_RIGID_STOP && !vi_contact_law_is_external(s->contacts[k].law.law);
-            if (rigid && vi_structure_meets_now(s, k)) { /* thrown against it by the last round, in a corner */
+            if (rigid && vi_structure_meets_now(s, k)) { /* thrown against its stop by the last round, in a corner */
                 s->state->status[k] = VI_CONTACT_TOUCHING;
                 s->state->leaving[k] = 0;
             }

@@ -10,19 +10,20 @@
 #include "body/modal/pressed_flow.h"
 #include "motion/majorant.h"
 
-/* Segments by series before a rest counts as long: most contacts with stops that yield are over by then. */
+/* Segments by series after which a rest counts as long, for stops that yield and for held contacts. Most contacts with
+ * stops that yield end earlier. */
 enum { PATIENCE = 16, PATIENCE_HELD = 4 };
-/* Least step, in radians of the fastest rate, that is worth an evaluation of all terms; and a whole rest, times the
- * number of modes where these must be found anew for it. */
+/* Least certified step, in radians of the fastest rate, that repays an evaluation of all terms. LEAST_REST: least
+ * length of a rest; times the number of modes where the modes must be found anew. */
 static const double LEAST_STEP = 8.0, LEAST_REST = 32.0;
-/* Likewise where they are those of several contacts, or of coupled damping, times the square of the number of modes. */
+/* Least length of a rest, in radians times modes^2, for modes of several contacts or of coupled damping. */
 static const double ALL_MODES = 2.0;
-/* Rounding of what must not fall to zero, in roundings of its terms: nearer to zero the series decide. */
+/* Distance from zero, in roundings of the terms, below which a guarded quantity is left to the series. */
 static const double MARGIN = 16.0;
 
 /* ---- is this a long rest? ---- */
 
-/* A body that stands still stays where it is to the last bit. */
+/* Does the body move? A body that stands still keeps its state to the last bit. */
 static bool moves(const vi_structure *s)
 {
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
@@ -33,7 +34,7 @@ static bool moves(const vi_structure *s)
     return false;
 }
 
-/* Rate that no motion of the resting body exceeds, rad/s. */
+/* Upper bound of the rates of the resting body's motions, rad/s. */
 static double fastest_rate(const vi_structure *s, const int32_t port[], int contacts)
 {
     double stiffness = 0.0, damping = 0.0;
@@ -56,24 +57,24 @@ static int64_t patience(const vi_structure *s)
     return PATIENCE_HELD;
 }
 
-/* Radians of the fastest rate from which a rest pays the finding of its modes. */
+/* Length of a rest, in radians of the fastest rate, from which finding its modes pays. */
 static double pays(const vi_structure *s)
 {
     return s->model->varies ? LEAST_REST * (double)vi_structure_modes(s->model) : LEAST_REST;
 }
 
-/* And the modes of several contacts, or of coupled damping; the series have spent so many already. */
+/* Does finding modes of several contacts, or of coupled damping, pay too? Segments by series count as radians. */
 static bool pays_for_all(const vi_structure *s, double radians)
 {
     const double modes = (double)vi_structure_modes(s->model), spent = s->model->varies ? 0.0 : (double)s->state->series;
     return radians + spent >= ALL_MODES * modes * modes || vi_pressed_goes_on(s);
 }
 
-/* ---- how far nothing happens ---- */
+/* ---- certified time without events ---- */
 
 typedef struct {
     int count;
-    vi_pressed_sight sight[VI_PORTS]; /* forces of the contacts that it rests on, clearances of the others */
+    vi_pressed_sight sight[VI_PORTS]; /* forces of the pressed contacts, clearances of the others */
 } guard;
 
 static void start_guard(const vi_structure *s, const vi_pressed_flow *flow, double length, guard *g)
@@ -95,8 +96,7 @@ static void start_guard(const vi_structure *s, const vi_pressed_flow *flow, doub
     }
 }
 
-/* How far it is certain that the contact is pressed and no other begins, up to the length, in steps that are worth
- * it. */
+/* Time in which the contact surely stays pressed and no other begins, at most the length. Steps < `least` end it. */
 static double certain(const vi_structure *s, const vi_pressed_flow *flow, const guard *g, double length, double least)
 {
     vi_complex part[VI_TERMS];
@@ -125,7 +125,7 @@ static double certain(const vi_structure *s, const vi_pressed_flow *flow, const 
 
 /* ---- extremes of the observed point ---- */
 
-/* The largest displacement * sign that the record knows, and that the body has now. */
+/* The largest displacement * sign so far, of the record and of the present state. */
 static double largest_so_far(const vi_structure *s, double sign)
 {
     const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
@@ -138,7 +138,7 @@ static double speed_noise(const vi_pressed_sight *sight, double speed, double fa
     return VI_ROUNDING * (fabs(speed) + sight->scale * fastest);
 }
 
-/* Climb from u to the next turning point above the bar; raises the bar to it. */
+/* Climb from u to the next turning point above the bar; raises the bar to this value. */
 static double climb(const vi_structure *s, const vi_pressed_flow *flow, vi_pressed_sight *sight, double fastest,
                     double u, double end)
 {
@@ -151,13 +151,13 @@ static double climb(const vi_structure *s, const vi_pressed_flow *flow, vi_press
             sight->offset += vi_max(0.0, -p.clearance);
             return u;
         }
-        /* the velocity falls to zero as a clearance does */
+        /* search the velocity's fall to zero like a clearance's */
         const vi_approach fall = {p.velocity, -p.acceleration, -p.jerk, p.bound, 0.0};
         u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), vi_least_step(end, 1e-12, evaluation)));
     }
 }
 
-/* Raise the bar of a sight to the largest value over the rest: what stays below it is passed over. */
+/* Raise the bar of a sight to the largest value over the rest; times with values below the bar are skipped. */
 static void raise_bar(const vi_structure *s, const vi_pressed_flow *flow, vi_pressed_sight *sight, double fastest,
                       double end)
 {
@@ -188,7 +188,7 @@ static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double s
     vi_record_extend(s->record, vi_structure_within(s, sign * sight.offset));
 }
 
-/* Largest force over the rest of the i-th contact that is rested on. */
+/* Update the largest force of the i-th pressed contact over the rest. */
 static void peak(const vi_structure *s, const vi_pressed_flow *flow, int i, double fastest, double end)
 {
     vi_touch_down *touch = &s->state->touch_down[flow->pressed->port[i]];
@@ -199,7 +199,7 @@ static void peak(const vi_structure *s, const vi_pressed_flow *flow, int i, doub
 
 /* ---- a rest ---- */
 
-/* Is the observed point one that is held? */
+/* Is the observed point itself held? */
 static bool sees_only_the_stop(const vi_structure *s)
 {
     const size_t size = (size_t)vi_structure_modes(s->model) * sizeof(double);
@@ -254,7 +254,7 @@ static double rest_for_long(const vi_structure *s, const vi_pressed *pressed, do
         u = u >= length + room ? length : u < length ? u : 0.0;
     }
     if (u < length) {
-        s->state->series = 0; /* something is about to happen */
+        s->state->series = 0; /* an event is near */
     }
     if (u > 0.0) {
         rest(s, &flow, fastest, u);

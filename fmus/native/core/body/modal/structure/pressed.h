@@ -1,13 +1,12 @@
-/* Long rests: a body that stays on one stop, held or pressed, is taken as far as nothing can happen. */
+/* Long rests: a body that stays on its stop, held or pressed, is moved up to the next possible event in one step. */
 #ifndef VIBROIMPACT_STRUCTURE_PRESSED_H
 #define VIBROIMPACT_STRUCTURE_PRESSED_H
 
 #include "body/modal/state.h"
 
-/* Follow a rest by its exact flow, at most `length` seconds: up to there, or to shortly before the contact may end
- * or another begin. Returns the time, s, where the body is then; 0 where it is followed by series: it rests on
- * several stops, on a power law, not for long yet, or something is about to happen. `room` after the end is
- * certified too. */
+/* Follow a rest by its exact flow, at most `length` seconds, and end shortly before the contact may end or another
+ * begin. Returns the time followed, s. 0 means that series must follow the body: it presses on a power law, has not
+ * rested long, or an event is near. `room` after the end is certified too. */
 double vi_structure_rest_on(const vi_structure *s, double length, double room);
 
 #endif

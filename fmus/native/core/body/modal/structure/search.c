@@ -7,14 +7,14 @@
 #include "body/modal/modal_scan.h"
 #include "motion/majorant.h"
 
-/* The last step to a contact is shorter than this over the fastest rate. */
+/* Longest last step to a contact, in radians of the fastest rate. */
 static const double LAST_STEP = 1e-5;
-/* Moment, in radians of the fastest rate, whose third power is a rounding. */
+/* Time from an evaluated instant to a contact, in radians of the fastest rate, whose third power is a rounding. */
 static const double NEAR = 6e-6;
-/* Evaluations between two scans, where the first has come to nothing. */
+/* Evaluations between two scans after a scan without result. */
 enum { PATIENCE = 4 };
 static const double SIXTH = 1.0 / 6.0;
-/* Iterations towards a contact that is known to be between two instants; two are usual. */
+/* Most iterations towards a contact that is bracketed between two instants; two are usual. */
 enum { MOST_ITERATIONS = 16 };
 
 void vi_search_points(const vi_structure *s, const vi_flight *flight, vi_point points[])
@@ -39,10 +39,10 @@ bool vi_search_is_idle(const vi_structure *s, const vi_flight *flight, const vi_
     return true;
 }
 
-/* ---- where the flight is ---- */
+/* ---- the instant reached ---- */
 
-/* Step to the contact found at this approach: that of the parabola that touches the motion there; none where the
- * velocity is no more than rounding, as the clearance is. */
+/* Last step to the contact at this approach, by the parabola that touches the motion there. 0 where the velocity, like
+ * the clearance, is mere rounding. */
 static double landing_step(const vi_structure_model *model, const vi_approach *p)
 {
     const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
@@ -51,7 +51,7 @@ static double landing_step(const vi_structure_model *model, const vi_approach *p
     return step * model->fastest < LAST_STEP ? step : 0.0;
 }
 
-/* What a contact that leaves its stop does at once is known exactly. */
+/* Set the exactly known start of a contact that leaves its stop. */
 static void correct_start(const vi_structure *s, int k, vi_approach *p)
 {
     p->clearance = 0.0;
@@ -59,7 +59,7 @@ static void correct_start(const vi_structure *s, int k, vi_approach *p)
     p->acceleration = s->state->leaving[k] >= 2 ? 0.0 : p->acceleration;
 }
 
-/* Does a contact that is at its stop but for rounding approach it by no more than rounding, before it is pulled off? */
+/* Is a contact on its stop, within rounding, pulled off again before an approach of rounding size can meet it? */
 static bool turns_back(const vi_approach *p, double noise)
 {
     return p->clearance <= noise && p->velocity > 0.0
@@ -71,7 +71,7 @@ static bool starts_on_stop(const vi_structure *s, int k, double u)
     return u == 0.0 && s->state->status[k] == VI_CONTACT_TOUCHING;
 }
 
-/* How the contacts that are looked for approach at an instant; false beyond the largest numbers. */
+/* Find the approach of each watched contact at an instant; false beyond the largest numbers. */
 static bool look(const vi_structure *s, const vi_flight *flight, const vi_point points[], const int looked_for[],
                  const vi_flight_instant *now, vi_approach approach[])
 {
@@ -105,7 +105,7 @@ static vi_search_end meet(vi_search_found *found, int k, double moment, double f
     return VI_SEARCH_CONTACT;
 }
 
-/* Step to the zero of the cubic that touches the motion here, from either side of it; NaN where that has none. */
+/* Step to the zero of the cubic that touches the motion here, forward or back; NaN when there is none. */
 static double step_to_zero(const vi_approach *p)
 {
     const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
@@ -116,14 +116,14 @@ static double step_to_zero(const vi_approach *p)
     return step - p->jerk * (step * step * step * SIXTH) / (p->velocity + p->acceleration * step);
 }
 
-/* Is what the cubic leaves out of the displacement, and of the velocity, less than their roundings? */
+/* Is the error of the cubic below the rounding of the displacement and of the velocity? */
 static bool is_exact(const vi_approach *p, double step, double scale)
 {
     const double cube = fabs(step * step * step);
     return p->bound * cube * fabs(step) <= 8.0 * DBL_EPSILON * scale && p->bound * cube <= DBL_EPSILON * p->velocity;
 }
 
-/* Newton's method on the exact motion, kept between two instants that have the contact between them. */
+/* Newton's method on the exact motion, kept between two instants that bracket the contact. */
 static bool close_in(const vi_structure *s, const vi_flight *flight, const vi_point *point, const vi_scan_found *bracket,
                      vi_search_found *found)
 {
@@ -146,7 +146,7 @@ static bool close_in(const vi_structure *s, const vi_flight *flight, const vi_po
 
 /* ---- the search ---- */
 
-/* One certified step from where the flight is; *goes_on says whether the search does. */
+/* Make one certified step; *goes_on says whether the search goes on. */
 static vi_search_end step_on(const vi_structure *s, const vi_flight *flight, const vi_point points[],
                              const int looked_for[], const vi_approach approach[], vi_search_found *found, bool *goes_on)
 {
@@ -184,21 +184,21 @@ static vi_search_end step_on(const vi_structure *s, const vi_flight *flight, con
     return VI_SEARCH_NOTHING;
 }
 
-/* Scan from where the flight is. True where that ends the search: *end says how; else found->u is as far as it came. */
+/* Scan onwards. True when this ends the search, with the result in *end; otherwise found->u is the time reached. */
 static bool scan_on(const vi_structure *s, const vi_flight *flight, const vi_point points[], const int looked_for[],
                     const vi_approach approach[], vi_search_found *found, vi_search_end *end)
 {
     vi_scan_found bracket;
-    const vi_scan_end came_to = vi_scan_flight(s->scan, flight, points, looked_for, &found->now, approach, &bracket);
+    const vi_scan_end result = vi_scan_flight(s->scan, flight, points, looked_for, &found->now, approach, &bracket);
     vi_budget_spend(&s->state->budget, (int64_t)bracket.blocks * vi_structure_modes(s->model));
     *end = VI_SEARCH_NOTHING;
-    found->u = came_to == VI_SCAN_CLEAR ? flight->length : bracket.low;
-    if (came_to == VI_SCAN_BRACKET && close_in(s, flight, &points[bracket.contact], &bracket, found)) {
+    found->u = result == VI_SCAN_CLEAR ? flight->length : bracket.low;
+    if (result == VI_SCAN_BRACKET && close_in(s, flight, &points[bracket.contact], &bracket, found)) {
         *end = found->u < flight->length ? VI_SEARCH_CONTACT : VI_SEARCH_NOTHING;
         found->u = vi_min(found->u, flight->length);
         return true;
     }
-    return came_to == VI_SCAN_CLEAR;
+    return result == VI_SCAN_CLEAR;
 }
 
 vi_search_end vi_search_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[],
@@ -207,7 +207,7 @@ vi_search_end vi_search_flight(const vi_structure *s, const vi_flight *flight, c
     vi_approach approach[VI_PORTS];
     int looked_for[VI_PORTS];
     const bool scans = s->scan != NULL && !flight->series && !s->model->varies && s->model->fastest > 0.0;
-    int rests = 0; /* evaluations before the next scan */
+    int pause = 0; /* evaluations left before the next scan */
     for (int k = 0; k < s->model->contacts; ++k) {
         looked_for[k] = vi_structure_watched(s, k);
     }
@@ -220,9 +220,9 @@ vi_search_end vi_search_flight(const vi_structure *s, const vi_flight *flight, c
         if (!look(s, flight, points, looked_for, &found->now, approach)) {
             return VI_SEARCH_BEYOND;
         }
-        if (scans && rests-- == 0) {
+        if (scans && pause-- == 0) {
             const double before = found->u;
-            rests = PATIENCE;
+            pause = PATIENCE;
             if (scan_on(s, flight, points, looked_for, approach, found, &end)) {
                 return end;
             }

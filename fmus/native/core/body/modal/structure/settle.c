@@ -9,20 +9,20 @@
 #include "body/modal/structure/contact.h"
 #include "contact/complementarity.h"
 
-/* Of a contact whose point others hold, a force of so many roundings is none. */
-static const double LITTLE = 16.0;
+/* Force, in roundings, up to which a contact whose point others hold counts as without force. */
+static const double NEGLIGIBLE_PUSH = 16.0;
 
 static bool gives_way(const vi_structure *s, int k)
 {
     return s->model->stop[k] == VI_YIELDING_STOP;
 }
 
-/* Contacts that touch without speed, the rigid ones first: a compliant stop presses only once it is pressed in. */
+/* Contacts that touch without speed, rigid stops first: a compliant stop presses only once it is pressed in. */
 typedef struct {
     int index[VI_PORTS];
     int count, rigid;
-    double gap[VI_PORTS];  /* acceleration away from the stop that is left, m/s^2 */
-    double push[VI_PORTS]; /* forces of the rigid ones, N */
+    double gap[VI_PORTS];  /* remaining acceleration away from the stop, m/s^2 */
+    double push[VI_PORTS]; /* forces of the rigid stops, N */
 } resting_contacts;
 
 static void order_resting(const vi_structure *s, const int candidate[], resting_contacts *resting)
@@ -38,7 +38,7 @@ static void order_resting(const vi_structure *s, const int candidate[], resting_
     }
 }
 
-/* The forces of the rigid stops, which only push, and what they leave of each contact's acceleration. */
+/* Find the forces of the rigid stops, which only push, and the remaining acceleration of each contact. */
 static void push_resting(const vi_structure *s, double g[VI_PORTS][VI_PORTS], resting_contacts *resting)
 {
     double acceleration[VI_MODES], force[VI_PORTS], small[VI_PORTS][VI_PORTS], b[VI_PORTS];
@@ -60,7 +60,7 @@ static void push_resting(const vi_structure *s, double g[VI_PORTS][VI_PORTS], re
     }
 }
 
-/* What a contact that touches without speed does: `push` is the acceleration that its stop would have to take. */
+/* Decide about a contact that touches without speed; `push` is the acceleration that its stop would have to take. */
 static void decide(const vi_structure *s, int k, double gap, double push)
 {
     vi_held_view view;
@@ -69,7 +69,7 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     const int32_t leaving = s->state->leaving[k];
     const double taken = compliant ? push : push * view.mobility;
     const bool tie = fabs(gap) <= view.noise && taken <= view.noise;
-    const bool nothing = fabs(gap) <= view.noise && taken <= LITTLE * view.noise;
+    const bool nothing = fabs(gap) <= view.noise && taken <= NEGLIGIBLE_PUSH * view.noise;
     const bool idle = (nothing || compliant) && vi_structure_is_kept(s, k);
     const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
     const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
@@ -85,12 +85,12 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     }
 }
 
-/* The rigid stop that pushes most, of those that have not been asked yet: what it holds leaves the others idle. */
-static int next_rigid(const resting_contacts *resting, const int asked[])
+/* The rigid stop with the largest push among those not yet decided: contacts that it holds leave the others idle. */
+static int next_rigid(const resting_contacts *resting, const int decided[])
 {
     int most = -1;
     for (int i = 0; i < resting->rigid; ++i) {
-        if (!asked[i] && (most < 0 || resting->push[i] > resting->push[most])) {
+        if (!decided[i] && (most < 0 || resting->push[i] > resting->push[most])) {
             most = i;
         }
     }
@@ -100,13 +100,13 @@ static int next_rigid(const resting_contacts *resting, const int asked[])
 static void settle_resting(const vi_structure *s, const int candidate[])
 {
     double g[VI_PORTS][VI_PORTS];
-    int asked[VI_PORTS] = {0};
+    int decided[VI_PORTS] = {0};
     resting_contacts resting;
     vi_structure_signed(s, s->model->compliance, g);
     order_resting(s, candidate, &resting);
     push_resting(s, g, &resting);
-    for (int i = next_rigid(&resting, asked); i >= 0; i = next_rigid(&resting, asked)) {
-        asked[i] = 1;
+    for (int i = next_rigid(&resting, decided); i >= 0; i = next_rigid(&resting, decided)) {
+        decided[i] = 1;
         decide(s, resting.index[i], resting.gap[i], resting.push[i]);
     }
     for (int i = resting.rigid; i < resting.count; ++i) {

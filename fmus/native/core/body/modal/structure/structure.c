@@ -16,17 +16,17 @@
 #include "body/modal/structure/settle.h"
 #include "motion/majorant.h"
 
-/* A contact just released stays on its stop for this times (1 / fastest rate + |time|): others that are released with it
- * are so at its instant but for the rounding of their forces. */
+/* Time that a released contact stays on its stop, in units of 1 / fastest rate + |time|. Contacts released together
+ * within this time are one instant, as the rounding of their forces separates them. */
 static const double ONE_RELEASE = 16.0 * DBL_EPSILON;
-/* Least length of a low bounce's flight, in radians of the fastest rate: it is only the reach of the search. */
+/* Least length of a low bounce's flight, in radians of the fastest rate; it only sets the reach of the search. */
 static const double LEAST_BOUNCE = 1e-6;
-/* Modal displacements and velocities below this have squares below the smallest normal number. */
+/* Modal displacement or velocity below which its square is below the smallest normal number. */
 static const double SMALLEST = 1e-154;
 
 /* ---- segments ---- */
 
-/* How long one segment may be, and what its end is. */
+/* Length of one segment, s, and the kind of its end. */
 static double segment_length(const vi_structure *s, vi_instant target, vi_ending *end)
 {
     return vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
@@ -37,7 +37,7 @@ static double landing_room(const vi_structure *s)
     return s->model->asks ? vi_landing_room(vi_clock_time(&s->model->clock, s->state->now)) : 0.0;
 }
 
-/* Does a contact of this instant wait for its answer? One that is at the end of the step does in any case. */
+/* Does a contact at this instant wait for its answer? A contact at the end of the step always does. */
 static bool stops_here(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     const double room = landing_room(s); /* 0 where no contact asks */
@@ -52,13 +52,13 @@ static void record_period(const vi_structure *s)
                      vi_structure_at(s->model, s->model->observed, s->state->p));
 }
 
-/* For how long a contact just released stays on its stop, s. */
+/* Time for which a contact just released stays on its stop, s. */
 static double one_release(const vi_structure *s)
 {
     return ONE_RELEASE * (s->model->radian + fabs(vi_clock_time(&s->model->clock, s->state->now)));
 }
 
-/* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
+/* Move the instant by u seconds; the two named ends are met exactly. The modal state is already there. */
 static void move(const vi_structure *s, double u, vi_ending end, vi_instant target)
 {
     vi_structure_state *state = s->state;
@@ -67,14 +67,14 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
         if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]
             && (u <= one_release(s) || vi_structure_only_touches(s, k))) {
-            continue; /* those that others hold stay, however long */
+            continue; /* contacts that others hold stay for any time */
         }
         if (state->status[k] == VI_CONTACT_TOUCHING) {
             state->status[k] = VI_CONTACT_FREE;
         }
         state->leaving[k] = 0;
     }
-    /* a contact may be so close before a period's end that rounding puts it there */
+    /* rounding may put a contact just before a period's end at that end */
     if (end == VI_ENDS_AT_PERIOD || (s->record->periods && after.periods > state->now.periods)) {
         state->now = (vi_instant){state->now.periods + 1, 0.0, 0.0};
         record_period(s);
@@ -85,13 +85,13 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 
 /* ---- flight ---- */
 
-/* Is nothing wanted of the motion before the target, and one evaluation enough however far that is? */
+/* Is no record wanted before the target, so that one evaluation is enough for any length? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
     return !flight->series && !s->record->extrema && !s->record->periods && !s->state->follow_energies;
 }
 
-/* Is it certain, whatever the acceleration, that no contact is about to meet its stop or slow to leave it? */
+/* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
 static bool bounces_high(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
@@ -111,8 +111,8 @@ static bool bounces_high(const vi_structure *s)
     return true;
 }
 
-/* How long to follow the body from where it is, since a contact is about to meet its stop or slow to leave it, s;
- * HUGE_VAL when that is not needed. */
+/* Time for which the body is followed from its present place, s: a contact is about to meet its stop or slow to leave
+ * it. HUGE_VAL when no contact is. */
 static double low_bounce(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
@@ -129,7 +129,7 @@ static double low_bounce(const vi_structure *s)
         const double a = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
         const double flight = vi_parabola_root(clearance, v, a), time = 1.0 / model->fastest;
         if (flight > 0.0 && flight * model->fastest < VI_LOW_BOUNCE) {
-            /* no shorter than moves the body at all: what rounding calls a bounce need not come down */
+            /* long enough to move the body: a bounce made of rounding need not come down */
             shortest = vi_min(shortest, vi_max(2.0 * flight, LEAST_BOUNCE * time));
         } else if (s->state->status[k] == VI_CONTACT_TOUCHING
                    && (fabs(v) + fabs(a) * time) * time < VI_LINGERING * vi_structure_displacement_size(s, k)) {
@@ -139,7 +139,7 @@ static double low_bounce(const vi_structure *s)
     return shortest;
 }
 
-/* Contacts have changed the motion: the next flight begins anew. */
+/* Contacts have changed the motion: the next flight starts from a new origin. */
 static void forget_origins(const vi_structure *s)
 {
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
@@ -147,7 +147,7 @@ static void forget_origins(const vi_structure *s)
     }
 }
 
-/* A flight to the target over which no stop can be met: one evaluation, however long. */
+/* Fly to the target when no stop can be met: one evaluation for any length. */
 static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant target)
 {
     const vi_clock *clock = &s->model->clock;
@@ -157,8 +157,7 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
     move(s, u, VI_ENDS_AT_TARGET, target);
 }
 
-/* Fly to the next contact, the end of the segment, or the target, whichever comes first; false where the motion goes
- * beyond the largest numbers. */
+/* Fly to the next contact, the segment's end, or the target, whichever is first; false when numbers overflow. */
 static bool fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     vi_ending end;
@@ -181,11 +180,11 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
         return true;
     }
     found.u = flight.length;
-    const vi_search_end came_to = idle ? VI_SEARCH_NOTHING : vi_search_flight(s, &flight, points, &found);
-    if (came_to == VI_SEARCH_BEYOND) {
+    const vi_search_end search_result = idle ? VI_SEARCH_NOTHING : vi_search_flight(s, &flight, points, &found);
+    if (search_result == VI_SEARCH_BEYOND) {
         return false;
     }
-    const bool meets = came_to == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
+    const bool meets = search_result == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
         vi_extremes_of_flight(s, &flight, u);
@@ -215,8 +214,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
 
 /* ---- coupled motion ---- */
 
-/* A mode that moves less than numbers can square has come to rest: between stops that take a share of its speed each time
- * it would go on until nothing is left of its digits. */
+/* Set a mode to rest when the squares of its numbers would underflow. Between stops that take a share of its speed each
+ * time it would go on until no digits are left. */
 static void end_smallest(const vi_structure *s)
 {
     vi_structure_state *state = s->state;
@@ -246,8 +245,7 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     case VI_DRIFT_ARRIVAL:
         vi_structure_meet(s, k, stops_here(s, target, request));
         break;
-    /* a load that has changed at once lifts the contact off with an acceleration, unless others hold its point; else
-     * its force has fallen to 0 */
+    /* a sudden load lifts the contact off with an acceleration, unless others hold it; otherwise its force is 0 */
     case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 || vi_structure_is_kept(s, k) ? 2 : 1); break;
     case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
     case VI_DRIFT_RETURN:
@@ -257,7 +255,7 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     }
 }
 
-/* Is any contact held, yielding, receding, or lifted by a high derivative only, or is the damping coupled? */
+/* Is any contact held, yielding, receding, or lifted only by a high derivative, or is the damping coupled? */
 static bool is_coupled(const vi_structure *s)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -313,7 +311,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
 
 /* ---- a step ---- */
 
-/* Is the motion still one of finite numbers, its energy too? */
+/* Are the motion and its energy finite? */
 static bool is_finite(const vi_structure *s)
 {
     double sum = 0.0;
@@ -323,7 +321,7 @@ static bool is_finite(const vi_structure *s)
     return sum <= DBL_MAX;
 }
 
-/* Do the loads have squares? Where a contact's force ends is a root of such. */
+/* Do the loads have finite squares? They occur under the root that gives the end of a contact's force. */
 static bool loads_are_finite(const vi_structure *s)
 {
     double sum = 0.0;
@@ -343,7 +341,7 @@ static void begin_step(const vi_structure *s)
         s->contacts[k].event_time = NAN;
     }
     if (!s->state->budget.unfinished) {
-        vi_structure_settle(s, true); /* nothing of the step is over yet */
+        vi_structure_settle(s, true); /* the step is at its start */
     }
     if (s->record->periods && !s->record->period_open && s->state->now.rest == 0.0) {
         const int64_t impacts = s->record->period_impacts; /* of this instant */
@@ -352,7 +350,7 @@ static void begin_step(const vi_structure *s)
     }
 }
 
-/* One flight or drift and what follows at its end; VI_STEP_DONE when the step goes on. */
+/* Make one flight or drift and resolve its end; VI_STEP_DONE when the step goes on. */
 static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     vi_structure_state *state = s->state;

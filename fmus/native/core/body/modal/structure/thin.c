@@ -7,11 +7,11 @@
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
-/* A depth that changes by less than this of itself hardly changes. */
-static const double SLOW = 0.1;
+/* Relative change of a depth below which the depth hardly changes and quadrature replaces differences of powers. */
+static const double SMALL_CHANGE = 0.1;
 
-/* How the other forces change the modal accelerations: no projection on held stops makes that longer,
- * m/s^3 kg^(1/2). */
+/* Upper bound of the rate at which the other forces change the modal accelerations, m/s^3 kg^(1/2). A projection on
+ * held stops makes it no longer. */
 static double jerk_size(const vi_structure *s, int k, const double acceleration[])
 {
     const vi_structure_model *model = s->model;
@@ -35,8 +35,8 @@ static double jerk_size(const vi_structure *s, int k, const double acceleration[
     return size;
 }
 
-/* How long the force may act as that of a penetration at constant rate, within the tolerance; at most `longest`, sought down
- * to `least`. */
+/* Time for which the force may act as that of a penetration at constant rate, within the tolerance; at most `longest`.
+ * The search ends below `least`. */
 static double accurate_time(const vi_structure *s, int k, double rate, const double acceleration[], double longest,
                             double least)
 {
@@ -47,7 +47,7 @@ static double accurate_time(const vi_structure *s, int k, double rate, const dou
     const double fastest = s->model->fastest, tolerance = s->model->tolerance;
     double t = longest;
     for (int halving = 0; halving < 1000 && t > least; ++halving, t *= 0.5) {
-        const double turn = (pull + 0.5 * jerk * t) * t; /* of the rate, at most, by everything else */
+        const double turn = (pull + 0.5 * jerk * t) * t; /* largest change of the rate by all other forces */
         const double depth = (speed + (0.5 * pull + jerk * t / 6.0) * t) * t;
         const double plain = stiffness * pow(depth, n) * t;
         const double most = plain * vi_max(0.0, 1.0 + press.damping * (rate + turn)); /* velocity change */
@@ -70,23 +70,23 @@ double vi_thin_time(const vi_structure *s, int k, double rate, const double acce
     if (moves <= accurate) {
         return accurate;
     }
-    /* a rate of rounding size is not what moves it */
+    /* a rate of rounding size does not move it */
     const double pull = fabs(vi_structure_at(s->model, s->model->shape[k], acceleration));
     const double jerk = jerk_size(s, k, acceleration) * sqrt(s->model->compliance[k][k]);
     const double turned = vi_min(sqrt(2.0 * rounding / pull), cbrt(6.0 * rounding / jerk));
     return vi_max(accurate, vi_min(moves, turned));
 }
 
-/* The integral of max(0, depth + rate t)^n over u seconds; *moment: of what it adds to the displacement meanwhile. */
+/* Integral of max(0, depth + rate t)^n over u seconds; *moment: integral of its effect on the displacement. */
 static double integrate(double n, double depth, double rate, double u, double *moment)
 {
     static const double NODES[] = {0.1127016653792583, 0.5, 0.8872983346207417}, WEIGHTS[] = {5.0, 8.0, 5.0};
-    const double after = vi_max(0.0, depth + rate * u), begun = pow(vi_max(0.0, depth), n + 1.0);
+    const double after = vi_max(0.0, depth + rate * u), start = pow(vi_max(0.0, depth), n + 1.0);
     double sum = 0.0;
     *moment = 0.0;
-    if (fabs(rate * u) >= SLOW * fabs(depth) && fabs(rate) > DBL_MIN / DBL_EPSILON) {
-        sum = (pow(after, n + 1.0) - begun) / ((n + 1.0) * rate);
-        *moment = ((pow(after, n + 2.0) - begun * vi_max(0.0, depth)) / ((n + 2.0) * rate) - begun * u)
+    if (fabs(rate * u) >= SMALL_CHANGE * fabs(depth) && fabs(rate) > DBL_MIN / DBL_EPSILON) {
+        sum = (pow(after, n + 1.0) - start) / ((n + 1.0) * rate);
+        *moment = ((pow(after, n + 2.0) - start * vi_max(0.0, depth)) / ((n + 2.0) * rate) - start * u)
                   / ((n + 1.0) * rate);
         return sum;
     }
@@ -105,7 +105,7 @@ void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, do
     double moment;
     const double whole = strength * integrate(press.exponent, depth, rate, u, &moment);
     const double stopping = vi_max(0.0, vi_structure_approach(s, k)) / s->model->compliance[k][k];
-    /* only what stops below the rounding of its displacement would be thrown back at once */
+    /* at most the impulse that stops the contact: a larger one, below the displacement's rounding, throws it back */
     const double impulse = rate > 0.0 ? vi_min(whole, stopping) : whole;
     vi_structure_push(s, k, impulse, s->state->p);
     vi_structure_push(s, k, impulse < whole ? strength * moment * (impulse / whole) : strength * moment, s->state->q);
